@@ -159,14 +159,14 @@ def _change(phase: str, search: str, changes: Mapping[str, float]) -> list[float
 
 def solve_path(spec: ProblemSpec, fixed: Sequence[Mapping[str, float]], starts: int, x0: Any) -> list[dict[str, Any]]:
     """Return optima with variables fixed one after the other, each from the one before; first from ``x0`` and random points."""
-    found: list[dict[str, Any]] = []
+    points: list[dict[str, Any]] = []
     for values in fixed:
         problem = spec.load().fix(**values) if values else spec.load()
-        solution = solve(problem, starts=1 if found else starts, x0=x0, workers=1)
+        solution = solve(problem, starts=1 if points else starts, x0=x0, workers=1)
         point = {"x": dict(solution.x), "power_W": float(solution.objective), "feasible": bool(solution.converged)}
-        found.append(point if point["feasible"] else {**point, "power_W": 0.0})
+        points.append(point if point["feasible"] else {**point, "power_W": 0.0})
         x0 = solution.x if solution.converged else x0
-    return found
+    return points
 
 
 def _list_shares() -> list[tuple[str, str]]:
@@ -202,9 +202,11 @@ def _make_computations(effort: NaoEffort) -> list[Any]:
 
 def compute(runner: Runner, effort: NaoEffort) -> dict[str, NaoResults]:
     """Return results by reading, and by reading and swarm where there are runs."""
-    found = runner.compute(_make_computations(effort), code=[])
+    computed = runner.compute(_make_computations(effort), code=[])
     solved = {
-        reading: {name.removeprefix(f"{reading}-"): value for name, value in found.items() if name.startswith(reading)}
+        reading: {
+            name.removeprefix(f"{reading}-"): value for name, value in computed.items() if name.startswith(reading)
+        }
         for reading in OPTIONS
     }
     results = {reading: NaoResults(reading=reading, solved=solved[reading]) for reading in OPTIONS}
@@ -229,39 +231,39 @@ def compute(runner: Runner, effort: NaoEffort) -> dict[str, NaoResults]:
     return results
 
 
-def _list_margins(found: NaoResults, phase: str, indexes: Sequence[str] = MARGINS) -> list[float]:
-    return [1000 * found.measure(phase, search)[index] for search in SEARCHES for index in indexes]
+def _list_margins(result: NaoResults, phase: str, indexes: Sequence[str] = MARGINS) -> list[float]:
+    return [1000 * result.measure(phase, search)[index] for search in SEARCHES for index in indexes]
 
 
 @BOOK.claim("margins-ssp", phase="ssp")
 @BOOK.claim("margins-ssp-digits", phase="ssp")
 @BOOK.claim("margins-dsp", phase="dsp")
-def measure_margins(found: NaoResults, phase: str) -> list[float]:
-    return _list_margins(found, phase)
+def measure_margins(result: NaoResults, phase: str) -> list[float]:
+    return _list_margins(result, phase)
 
 
 @BOOK.claim("least-margins-dsp")
-def measure_least_margins(found: NaoResults) -> list[float]:
-    return _list_margins(found, "dsp", MARGINS[:2])
+def measure_least_margins(result: NaoResults) -> list[float]:
+    return _list_margins(result, "dsp", MARGINS[:2])
 
 
 @BOOK.claim("pso-optimal-ssp", phase="ssp")
 @BOOK.claim("pso-optimal-dsp", phase="dsp")
-def measure_excess(found: NaoResults, phase: str) -> float | None:
-    return found.excess[phase, "PSO"] if found.optimum(phase)["feasible"] else None
+def measure_excess(result: NaoResults, phase: str) -> float | None:
+    return result.excess[phase, "PSO"] if result.optimum(phase)["feasible"] else None
 
 
 @BOOK.claim("power-ssp", phase="ssp", index="power_W")
 @BOOK.claim("power-dsp", phase="dsp", index="power_W")
 @BOOK.claim("torque-level-ssp", phase="ssp", index="torque_change_Nm")
 @BOOK.claim("torque-level-dsp", phase="dsp", index="torque_change_Nm")
-def measure_levels(found: NaoResults, phase: str, index: str) -> list[float]:
-    return [found.measure(phase, search)[index] for search in SEARCHES]
+def measure_levels(result: NaoResults, phase: str, index: str) -> list[float]:
+    return [result.measure(phase, search)[index] for search in SEARCHES]
 
 
 @BOOK.claim("power-lead-ssp")
-def measure_power_lead(found: NaoResults) -> float:
-    pso, ga = measure_levels(found, "ssp", "power_W")
+def measure_power_lead(result: NaoResults) -> float:
+    pso, ga = measure_levels(result, "ssp", "power_W")
     return 1000 * (ga - pso)
 
 
@@ -269,8 +271,8 @@ def measure_power_lead(found: NaoResults) -> float:
 @BOOK.claim("similar-power", phase="dsp", index="power_W")
 @BOOK.claim("torque-change-ssp", phase="ssp", index="torque_change_Nm")
 @BOOK.claim("torque-change-dsp", phase="dsp", index="torque_change_Nm")
-def measure_share(found: NaoResults, phase: str, index: str) -> float:
-    pso, ga = measure_levels(found, phase, index)
+def measure_share(result: NaoResults, phase: str, index: str) -> float:
+    pso, ga = measure_levels(result, phase, index)
     return 100 * (pso / ga - 1)
 
 
@@ -278,14 +280,14 @@ def measure_share(found: NaoResults, phase: str, index: str) -> float:
 @BOOK.claim("least-margins-ssp", phase="ssp", indexes=MARGINS[:2], sign=-1)
 @BOOK.claim("mean-lead-dsp", phase="dsp", indexes=MARGINS[2:], sign=-1)
 @BOOK.claim("min-lead-dsp", phase="dsp", indexes=MARGINS[:2])
-def measure_leads(found: NaoResults, phase: str, indexes: Sequence[str], sign: int = 1) -> list[float]:
-    pso, ga = (found.measure(phase, search) for search in SEARCHES)
+def measure_leads(result: NaoResults, phase: str, indexes: Sequence[str], sign: int = 1) -> list[float]:
+    pso, ga = (result.measure(phase, search) for search in SEARCHES)
     return [round(1000 * sign * (pso[index] - ga[index]), 1) for index in indexes]
 
 
 @BOOK.claim("more-stable")
-def measure_more_stable(found: NaoResults) -> list[float]:
-    ssp, dsp = (found.measure(phase, "PSO") for phase in PHASES)
+def measure_more_stable(result: NaoResults) -> list[float]:
+    ssp, dsp = (result.measure(phase, "PSO") for phase in PHASES)
     return [1000 * (dsp[index] - ssp[index]) for index in MARGINS]
 
 
@@ -294,19 +296,19 @@ def measure_more_stable(found: NaoResults) -> list[float]:
 @BOOK.claim("slower-ssp", sweep="durations-ssp", last_first=True)
 @BOOK.claim("slower-dsp", sweep="durations-dsp", last_first=True)
 @BOOK.claim("swing-beyond", sweep="swings")
-def measure_sweep(found: NaoResults, sweep: str, *, last_first: bool = False) -> list[float] | None:
-    powers = found.list_powers(sweep)
+def measure_sweep(result: NaoResults, sweep: str, *, last_first: bool = False) -> list[float] | None:
+    powers = result.list_powers(sweep)
     return powers[::-1] if powers and last_first else powers
 
 
 @BOOK.claim("lower-hip-x", axis="x")
 @BOOK.claim("lower-hip-y", axis="y")
-def measure_lower_hip(found: NaoResults, axis: str) -> list[list[float]]:
+def measure_lower_hip(result: NaoResults, axis: str) -> list[list[float]]:
     index = f"dbm_{axis}_min_m"
     changes = [{}, {"hip_height_m": 0.0}]
     return [
         [
-            1000 * found.measure(phase, "PSO", **{k: found.lowest_hip_m(phase) for k in change})[index]
+            1000 * result.measure(phase, "PSO", **{k: result.lowest_hip_m(phase) for k in change})[index]
             for change in changes
         ]
         for phase in PHASES
@@ -314,19 +316,19 @@ def measure_lower_hip(found: NaoResults, axis: str) -> list[list[float]]:
 
 
 @BOOK.claim("straight")
-def measure_straight(found: NaoResults) -> list[list[float]]:
-    gaits = [[found.measure(phase, "PSO", **change) for change in ({}, STRAIGHT)] for phase in PHASES]
+def measure_straight(result: NaoResults) -> list[list[float]]:
+    gaits = [[result.measure(phase, "PSO", **change) for change in ({}, STRAIGHT)] for phase in PHASES]
     return [[1000 * gait[index] for gait in pair] for pair in gaits for index in MARGINS[:2]]
 
 
 @BOOK.claim("oscillation")
-def measure_oscillation(found: NaoResults) -> list[list[float]]:
-    return [[found.measure(phase, "PSO", **change)["power_W"] for change in (STRAIGHT, {})] for phase in PHASES]
+def measure_oscillation(result: NaoResults) -> list[list[float]]:
+    return [[result.measure(phase, "PSO", **change)["power_W"] for change in (STRAIGHT, {})] for phase in PHASES]
 
 
 @BOOK.claim("oscillation-torque")
-def measure_oscillation_torque(found: NaoResults) -> list[list[float]]:
-    return [[_root_mean(found.sample(phase, **change).arrays["tau"]) for change in (STRAIGHT, {})] for phase in PHASES]
+def measure_oscillation_torque(result: NaoResults) -> list[list[float]]:
+    return [[_root_mean(result.sample(phase, **change).arrays["tau"]) for change in (STRAIGHT, {})] for phase in PHASES]
 
 
 def _root_mean(values: Any) -> float:
@@ -334,10 +336,10 @@ def _root_mean(values: Any) -> float:
 
 
 @BOOK.claim("relief")
-def measure_relief(found: NaoResults) -> list[list[float]]:
+def measure_relief(result: NaoResults) -> list[list[float]]:
     rows = []
     for phase in PHASES:
-        ends = [found.sample(phase, hip_height_m=at) for at in (found.lowest_hip_m(phase), HIPS_M[0])]
+        ends = [result.sample(phase, hip_height_m=at) for at in (result.lowest_hip_m(phase), HIPS_M[0])]
         for kind in ("Knee", "Ankle"):
             columns = [name[1:].startswith(kind) for name in ends[0].joints]
             rows.append([_root_mean(end.arrays["tau"][:, columns]) for end in ends])
@@ -346,13 +348,13 @@ def measure_relief(found: NaoResults) -> list[list[float]]:
 
 @BOOK.claim("few-mm")
 @BOOK.claim("hip-variation", searches=("GA", "PSO"))
-def measure_hip_range(found: NaoResults, searches: Sequence[str] = SEARCHES) -> list[float]:
-    return [1000 * float(np.ptp(found.sample("ssp", search).arrays["hip"][:, 2])) for search in searches]
+def measure_hip_range(result: NaoResults, searches: Sequence[str] = SEARCHES) -> list[float]:
+    return [1000 * float(np.ptp(result.sample("ssp", search).arrays["hip"][:, 2])) for search in searches]
 
 
-def _compute_energies(found: NaoResults, search: str, *, heat: bool = True) -> dict[str, float]:
+def _compute_energies(result: NaoResults, search: str, *, heat: bool = True) -> dict[str, float]:
     """Return the energy that each joint draws in single support, or its mechanical part [J]."""
-    signals, problem = found.sample("ssp", search), _load("ssp", ())[0]
+    signals, problem = result.sample("ssp", search), _load("ssp", ())[0]
     tau, loss = signals.arrays["tau"], heat * problem.value("heat_loss_W_per_Nm2")
     energies = np.trapezoid(np.abs(tau * signals.arrays["qd"]) + loss * tau**2, signals.arrays["t"], axis=0)
     return dict(zip(signals.joints, map(float, np.asarray(energies)), strict=True))
@@ -360,30 +362,30 @@ def _compute_energies(found: NaoResults, search: str, *, heat: bool = True) -> d
 
 @BOOK.claim("knees", kind="Knee")
 @BOOK.claim("hips", kind="Hip")
-def measure_joints(found: NaoResults, kind: str) -> list[float]:
+def measure_joints(result: NaoResults, kind: str) -> list[float]:
     leads = []
     for search in SEARCHES:
-        drawn, shares = _compute_energies(found, search), dict.fromkeys((*KINDS, "arms"), 0.0)
+        drawn, shares = _compute_energies(result, search), dict.fromkeys((*KINDS, "arms"), 0.0)
         for joint, energy in drawn.items():
-            own = next((k for k in KINDS if joint[1:].startswith(k)), "arms")
-            shares[own] += 100 * energy / sum(drawn.values())
+            group = next((k for k in KINDS if joint[1:].startswith(k)), "arms")
+            shares[group] += 100 * energy / sum(drawn.values())
         leads.append(shares.pop(kind) - max(shares.values()))
     return leads
 
 
 @BOOK.claim("swing-hip")
-def measure_swing_hip(found: NaoResults) -> list[float]:
+def measure_swing_hip(result: NaoResults) -> list[float]:
     shares = []
     for heat in (True, False):
-        drawn = _compute_energies(found, "PSO", heat=heat)
+        drawn = _compute_energies(result, "PSO", heat=heat)
         swing, support = (sum(drawn[f"{side}Hip{axis}"] for axis in ("Roll", "Pitch")) for side in "RL")
         shares.append(100 * swing / (swing + support))
     return shares
 
 
 @BOOK.claim("swing-joints")
-def measure_swing_joints(found: NaoResults) -> list[float]:
-    ends = [found.sample("ssp", swing_height_m=at) for at in (0.015, 0.030)]
+def measure_swing_joints(result: NaoResults) -> list[float]:
+    ends = [result.sample("ssp", swing_height_m=at) for at in (0.015, 0.030)]
     columns = [ends[0].joints.index(f"R{joint}Pitch") for joint in ("Hip", "Knee", "Ankle")]
     hip, knee, ankle = np.degrees(np.abs(ends[1].arrays["q"] - ends[0].arrays["q"]).max(axis=0)[columns])
     return [float(knee - hip), float(ankle - hip)]
@@ -393,36 +395,36 @@ def measure_swing_joints(found: NaoResults) -> list[float]:
 @BOOK.claim("too-slow-dsp", phase="dsp", end=-1)
 @BOOK.claim("too-fast-ssp", phase="ssp", end=0)
 @BOOK.claim("too-fast-dsp", phase="dsp", end=0)
-def measure_pace(found: NaoResults, phase: str, end: int) -> float:
+def measure_pace(result: NaoResults, phase: str, end: int) -> float:
     problem, time = _load(phase, ())[0], TIMES[phase]
     x = dict(zip(problem.names, PRINTED[phase, "PSO"].x, strict=True))
     margins = []
     for at in np.geomspace(problem.value(f"{time}.lower"), problem.value(f"{time}.upper"), PACES).tolist():
         rates = {name: value * x[time] / at for name, value in x.items() if name.startswith("hip_v")}
-        gait = found.measure(phase, "PSO", **{time: at}, **rates)
+        gait = result.measure(phase, "PSO", **{time: at}, **rates)
         margins.append(min(gait[index] for index in MARGINS[:2]))
     return 100 * (1 - margins[end] / max(margins))
 
 
 @BOOK.claim("lateral-margin")
-def measure_lateral_margin(found: NaoResults) -> float:
+def measure_lateral_margin(result: NaoResults) -> float:
     x6, x7 = PRINTED["ssp", "PSO"].x[5:7]
-    halved = found.measure("ssp", "PSO", hip_vy_start_m_s=x6 / 2, hip_vy_end_m_s=x7 / 2)
-    return 1000 * (found.measure("ssp", "PSO")["dbm_y_mean_m"] - halved["dbm_y_mean_m"])
+    halved = result.measure("ssp", "PSO", hip_vy_start_m_s=x6 / 2, hip_vy_end_m_s=x7 / 2)
+    return 1000 * (result.measure("ssp", "PSO")["dbm_y_mean_m"] - halved["dbm_y_mean_m"])
 
 
 @BOOK.claim("arms")
-def measure_arms(found: NaoResults) -> list[float]:
+def measure_arms(result: NaoResults) -> list[float]:
     gains = []
     for phase in PHASES:
-        held = evaluate(_make_spec(phase, found.reading, arms="held"), PRINTED[phase, "PSO"].x)
-        gains.append(max(1000 * (found.measure(phase, "PSO")[index] - held[index]) for index in MARGINS))
+        held = evaluate(_make_spec(phase, result.reading, arms="held"), PRINTED[phase, "PSO"].x)
+        gains.append(max(1000 * (result.measure(phase, "PSO")[index] - held[index]) for index in MARGINS))
     return gains
 
 
 @BOOK.claim("statistic-ssp", rank_sum=70)
 @BOOK.claim("statistic-dsp", rank_sum=90)
-def measure_statistic(found: NaoResults, rank_sum: int, runs: int = 11) -> list[float]:
+def measure_statistic(result: NaoResults, rank_sum: int, runs: int = 11) -> list[float]:
     z = (rank_sum - runs * (2 * runs + 1) / 2 + 0.5) / math.sqrt(runs**2 * (2 * runs + 1) / 12)
     p = math.erfc(abs(z) / math.sqrt(2))
     return [z, p, p / 2]
@@ -430,21 +432,21 @@ def measure_statistic(found: NaoResults, rank_sum: int, runs: int = 11) -> list[
 
 @BOOK.claim("better-ssp", runs=True, phase="ssp")
 @BOOK.claim("better-dsp", runs=True, phase="dsp")
-def measure_better(found: NaoResults, phase: str) -> Found:
-    pso, ga = (found.final_powers(phase, search) for search in SEARCHES)
+def measure_better(result: NaoResults, phase: str) -> Found:
+    pso, ga = (result.final_powers(phase, search) for search in SEARCHES)
     return Found(1000 * float(np.median(ga) - np.median(pso)), p=approximate_rank_sum(pso, ga).p_two_sided)
 
 
 @BOOK.claim("same-optimum-ssp", runs=True, phase="ssp")
 @BOOK.claim("same-optimum-dsp", runs=True, phase="dsp")
-def measure_run_excess(found: NaoResults, phase: str) -> list[float]:
-    best = found.optimum(phase)["power_W"]
-    return sorted(100 * (power / best - 1) for power in found.final_powers(phase, "PSO"))
+def measure_run_excess(result: NaoResults, phase: str) -> list[float]:
+    best = result.optimum(phase)["power_W"]
+    return sorted(100 * (power / best - 1) for power in result.final_powers(phase, "PSO"))
 
 
 @BOOK.claim("torque-rank", runs=True)
-def measure_run_torques(found: NaoResults) -> list[float]:
-    return [run.verdict.indexes["torque_change_Nm"] for run in found.searches["ssp", "PSO"]]
+def measure_run_torques(result: NaoResults) -> list[float]:
+    return [run.verdict.indexes["torque_change_Nm"] for run in result.searches["ssp", "PSO"]]
 
 
 @BOOK.effect("zmp")
@@ -458,9 +460,9 @@ def describe_reading(results: Mapping[str, NaoResults]) -> str:
     )
 
 
-def _find_error(found: NaoResults, phase: str, indexes: Sequence[str] = MARGINS) -> float:
+def _find_error(result: NaoResults, phase: str, indexes: Sequence[str] = MARGINS) -> float:
     printed = [1000 * PRINTED[phase, search].figures[index] for search in SEARCHES for index in indexes]
-    return float(np.abs(np.subtract(_list_margins(found, phase, indexes), printed)).max())
+    return float(np.abs(np.subtract(_list_margins(result, phase, indexes), printed)).max())
 
 
 def _describe_option(results: Mapping[str, NaoResults], **option: Any) -> str:
@@ -498,7 +500,7 @@ def make_tables(results: Mapping[str, NaoResults]) -> list[Table]:
         *(_tabulate_phase(results, phase) for phase in PHASES),
         _tabulate_swings(results),
         _tabulate_shares(results),
-        *([_tabulate_runs(results)] if any(found.searches for found in results.values()) else []),
+        *([_tabulate_runs(results)] if any(result.searches for result in results.values()) else []),
     ]
 
 
@@ -507,9 +509,9 @@ def _tabulate_phase(results: Mapping[str, NaoResults], phase: str) -> Table:
     for search in SEARCHES:
         printed = PRINTED[phase, search]
         columns[f"{search}, paper"] = printed.figures.__getitem__
-        for reading, found in results.items():
-            if not found.searches:
-                columns[f"{search}, {reading} reading"] = found.measure(phase, search).__getitem__
+        for reading, result in results.items():
+            if not result.searches:
+                columns[f"{search}, {reading} reading"] = result.measure(phase, search).__getitem__
         for robot in ("nao-v4", "nao-v6"):
             spec = _make_spec(phase, "printed", robot=robot)
             columns[f"{search}, printed reading, {robot[-2:].upper()}"] = evaluate(spec, printed.x).__getitem__
@@ -548,12 +550,12 @@ def _tabulate_swings(results: Mapping[str, NaoResults]) -> Table:
 
 def compare_shares(results: Mapping[str, NaoResults]) -> dict[tuple[str, str], tuple[float, float]]:
     """Return power [W] and excess over the optimum [%] of PSO's printed double support by share and who carries the arms."""
-    found = {}
+    shares = {}
     for share, arms in _list_shares():
         power = evaluate(_make_spec("dsp", "printed", torso_share=share, arms=arms), PRINTED["dsp", "PSO"].x)["power_W"]
         optimum = results["printed"].solved[f"share-{share}-{arms}"][0]
-        found[share, arms] = power, 100 * (power / optimum["power_W"] - 1) if optimum["feasible"] else math.nan
-    return found
+        shares[share, arms] = power, 100 * (power / optimum["power_W"] - 1) if optimum["feasible"] else math.nan
+    return shares
 
 
 def _tabulate_shares(results: Mapping[str, NaoResults]) -> Table:
@@ -565,10 +567,10 @@ def _tabulate_shares(results: Mapping[str, NaoResults]) -> Table:
 
 def _tabulate_runs(results: Mapping[str, NaoResults]) -> Table:
     rows = []
-    for reading, found in results.items():
-        for phase, search in found.searches:
-            powers = found.final_powers(phase, search)
-            best = found.optimum(phase)["power_W"]
+    for reading, result in results.items():
+        for phase, search in result.searches:
+            powers = result.final_powers(phase, search)
+            best = result.optimum(phase)["power_W"]
             rows.append(
                 (reading, PHASES[phase], search, len(powers), min(powers), float(np.median(powers)), max(powers), best)
             )
@@ -602,23 +604,24 @@ def draw(results: Mapping[str, NaoResults]) -> Figure:
 
 def explain(results: Mapping[str, NaoResults]) -> list[str]:
     """Return what stays unexplained, and what cannot be tested."""
-    found = results["printed"]
-    missing = {key: PRINTED[key].figures["power_W"] - found.measure(*key)["power_W"] for key in PRINTED}
-    torque = [found.measure("dsp", search)["torque_change_Nm"] for search in SEARCHES]
+    result = results["printed"]
+    missing = {key: PRINTED[key].figures["power_W"] - result.measure(*key)["power_W"] for key in PRINTED}
+    torque = [result.measure("dsp", search)["torque_change_Nm"] for search in SEARCHES]
     printed = [PRINTED["dsp", search].figures["torque_change_Nm"] for search in SEARCHES]
     means = [
         m - 1000 * PRINTED["dsp", "PSO"].figures[index]
-        for index, m in zip(MARGINS[2:], _list_margins(found, "dsp", MARGINS[2:])[:2], strict=True)
+        for index, m in zip(MARGINS[2:], _list_margins(result, "dsp", MARGINS[2:])[:2], strict=True)
     ]
     shares = compare_shares(results)
-    own, apart, shared = (f"{shares['lever', arms][1]:.1f} %" for arms in ("carried", "separate", "shared"))
+    carried, apart, shared = (f"{shares['lever', arms][1]:.1f} %" for arms in ("carried", "separate", "shared"))
     return [
         f"**Unexplained.** Power of single support is {missing['ssp', 'PSO']:.3f} W (PSO) and {missing['ssp', 'GA']:.3f} W (GA) "
         "below the print: nearly a constant, which touches no optimum or ranking (at other swing heights see the table). "
         f"Torque change of double support is {torque[0]:.3f} and {torque[1]:.3f} Nm for {printed[0]} and {printed[1]} Nm in "
         f"print; its mean margins differ by {means[0]:+.1f} and {means[1]:+.1f} mm (x, y). Its power depends on who carries the "
         f"arms, which is not printed: PSO's printed solution is {shares['printed', 'carried'][1]:.1f} % above the optimum by "
-        f"(28), (29) as printed, and {apart} (arms apart), {shared} (arms shared), {own} (own arms) by the text's lever rule.",
+        f"(28), (29) as printed, and {apart} (arms apart), {shared} (arms shared), "
+        f"{carried} (own arms) by the lever rule of the text.",
         "**Not tested.** Not printed: initial populations, final values of single runs, masses, figures as numbers, and other "
         "genetic algorithms against which SBX is called the most efficient. Not implemented: Webots, the robot itself.",
     ]

@@ -98,8 +98,8 @@ class Walk12Effort(Effort):
     @property
     def steps(self) -> int:
         """Runs, and the report."""
-        own = 3 * (len(TABLE_3) + len(self.lengths_m))
-        starts = own + 2 * len(READINGS) * len(TABLE_4) + len(UNBENT_WEIGHTS)
+        readings = 3 * (len(TABLE_3) + len(self.lengths_m))
+        starts = readings + 2 * len(READINGS) * len(TABLE_4) + len(UNBENT_WEIGHTS)
         return starts * self.starts + (3 * len(TABLE_3) + len(READINGS) * len(TABLE_4)) * self.runs + 1
 
 
@@ -176,8 +176,8 @@ class Results:
     def front(self) -> list[RunRecord]:
         """Most stable gaits by rising step length."""
         prefix = _title(LITERAL if self.reading == SECOND else self.reading, "length-")
-        found = [choose_best(runs) for (title, _), runs in self.runs.items() if title.startswith(prefix)]
-        return sorted(found, key=lambda run: run.x["step_length_m"])
+        result = [choose_best(runs) for (title, _), runs in self.runs.items() if title.startswith(prefix)]
+        return sorted(result, key=lambda run: run.x["step_length_m"])
 
 
 def compute(runner: Runner, effort: Walk12Effort) -> dict[str, Results]:
@@ -204,8 +204,8 @@ def _make_tasks(effort: Walk12Effort) -> Iterator[Task]:
 
 
 def _make_optimum_tasks(effort: Walk12Effort, results: Mapping[str, Results]) -> Iterator[Task]:
-    for reading, found in results.items():
-        for row, f1max in zip(TABLE_4, found.f1max_over_time, strict=True):
+    for reading, result in results.items():
+        for row, f1max in zip(TABLE_4, result.f1max_over_time, strict=True):
             values = {"f1max": f1max, "step_time_s": row.step_time_s}
             yield from _make_runs(effort, _make_spec(reading, f"optimum-{row.step_time_s:g}s", row.weight, **values))
 
@@ -227,34 +227,34 @@ def _make_runs(effort: Walk12Effort, spec: ProblemSpec, *, ga: bool = False) -> 
 
 @BOOK.claim("f", rows=TABLE_3)
 @BOOK.claim("f-of-table-4", rows=TABLE_4)
-def list_f(found: Results, rows: Sequence[PaperRow]) -> list[float]:
-    return [compute_f(row, row.f1max, **found.options) for row in rows]
+def list_f(result: Results, rows: Sequence[PaperRow]) -> list[float]:
+    return [compute_f(row, row.f1max, **result.options) for row in rows]
 
 
 @BOOK.claim("f1-last")
-def compute_last_f1(found: Results) -> float:
-    return found.f1[-1]
+def compute_last_f1(result: Results) -> float:
+    return result.f1[-1]
 
 
 @BOOK.claim("f1max")
-def compute_f1max(found: Results) -> float:
-    return F1MAX * found.best("1").verdict.objective
+def compute_f1max(result: Results) -> float:
+    return F1MAX * result.best("1").verdict.objective
 
 
 @BOOK.claim("optimal")
-def list_gaps(found: Results) -> list[float]:
-    pairs = zip(list_f(found, TABLE_3), found.optima, strict=True)
+def list_gaps(result: Results) -> list[float]:
+    pairs = zip(list_f(result, TABLE_3), result.optima, strict=True)
     return [100 * (1 - f / best.verdict.objective) for f, best in pairs]
 
 
 @BOOK.claim("optimal-over-time")
-def list_gaps_over_time(found: Results) -> list[float]:
-    rows = zip(TABLE_4, found.f1max_over_time, found.optima_over_time, strict=True)
-    return [100 * (1 - compute_f(row, most, **found.options) / best.verdict.objective) for row, most, best in rows]
+def list_gaps_over_time(result: Results) -> list[float]:
+    rows = zip(TABLE_4, result.f1max_over_time, result.optima_over_time, strict=True)
+    return [100 * (1 - compute_f(row, most, **result.options) / best.verdict.objective) for row, most, best in rows]
 
 
 @BOOK.claim("optimal-by-print")
-def compute_lead_by_print(found: Results) -> float:
+def compute_lead_by_print(result: Results) -> float:
     """Return the largest lead in f of a printed gait at the lambda of another one, by (11) from the print.
 
     It is linear in the printed f and s, so the effect of their rounding is known; s is within (7).
@@ -270,34 +270,34 @@ def compute_lead_by_print(found: Results) -> float:
 
 @BOOK.claim("steps", columns=(0,))
 @BOOK.claim("variables", columns=(1, 2, 3))
-def list_variables(found: Results, columns: Sequence[int]) -> list[float]:
-    return [1e3 * get_point(best)[k] for best in found.optima for k in columns]
+def list_variables(result: Results, columns: Sequence[int]) -> list[float]:
+    return [1e3 * get_point(best)[k] for best in result.optima for k in columns]
 
 
 @BOOK.claim("steps-over-time")
-def list_steps_over_time(found: Results) -> list[float]:
-    return [1e3 * get_point(best)[0] for best in found.optima_over_time]
+def list_steps_over_time(result: Results) -> list[float]:
+    return [1e3 * get_point(best)[0] for best in result.optima_over_time]
 
 
 @BOOK.claim("most-stable")
-def compute_lead(found: Results) -> float:
-    *others, last = found.f1
+def compute_lead(result: Results) -> float:
+    *others, last = result.f1
     return 100 * (last / max(others) - 1)
 
 
 @BOOK.claim("short-steps")
-def list_front(found: Results) -> list[float]:
-    return [run.verdict.indexes["f1_per_m2s"] for run in found.front]
+def list_front(result: Results) -> list[float]:
+    return [run.verdict.indexes["f1_per_m2s"] for run in result.front]
 
 
 @BOOK.claim("slower")
-def list_steps_by_f1(found: Results) -> list[float]:
-    return [1e3 * row.s for _, row in sorted(zip(found.f1, TABLE_3, strict=True), key=lambda pair: pair[0])]
+def list_steps_by_f1(result: Results) -> list[float]:
+    return [1e3 * row.s for _, row in sorted(zip(result.f1, TABLE_3, strict=True), key=lambda pair: pair[0])]
 
 
 @BOOK.claim("margin")
-def list_optimal_f1(found: Results) -> list[float]:
-    return [best.verdict.indexes["f1_per_m2s"] for best in found.optima]
+def list_optimal_f1(result: Results) -> list[float]:
+    return [best.verdict.indexes["f1_per_m2s"] for best in result.optima]
 
 
 def compute_stable_share(x: Sequence[float], zmp: str) -> float:
@@ -309,40 +309,40 @@ def compute_stable_share(x: Sequence[float], zmp: str) -> float:
 
 
 @BOOK.claim("static")
-def list_last_shares(found: Results) -> list[float]:
-    return [compute_stable_share(x, found.zmp) for x in (LAST.x, get_point(found.best("1")))]
+def list_last_shares(result: Results) -> list[float]:
+    return [compute_stable_share(x, result.zmp) for x in (LAST.x, get_point(result.best("1")))]
 
 
 @BOOK.claim("speed-hip", share=0.5)
 @BOOK.claim("speed-foot", share=1.0)
-def list_speeds(found: Results, share: float) -> list[float]:
+def list_speeds(result: Results, share: float) -> list[float]:
     return [share * row.s for row in (SECOND_ROW, SMALL, LAST)]
 
 
 @BOOK.claim("faster")
-def compute_step_difference(found: Results) -> float:
+def compute_step_difference(result: Results) -> float:
     return 1e3 * (SMALL.s - SECOND_ROW.s)
 
 
 @BOOK.claim("time-steps")
-def count_time_steps(found: Results) -> int:
+def count_time_steps(result: Results) -> int:
     return GA.population * PRINTED_STEPS
 
 
 @BOOK.claim("trend")
-def compute_trend(found: Results) -> float:
-    slow, *_, fast = found.f1max_over_time
+def compute_trend(result: Results) -> float:
+    slow, *_, fast = result.f1max_over_time
     return 100 * (slow / fast - 1)
 
 
 @BOOK.claim("f1-over-time")
-def list_f1_over_time(found: Results) -> list[float]:
-    return [compute_f1(row, **found.options) for row in reversed(TABLE_4)]
+def list_f1_over_time(result: Results) -> list[float]:
+    return [compute_f1(row, **result.options) for row in reversed(TABLE_4)]
 
 
 @BOOK.claim("f1max-over-time")
-def list_f1max_over_time(found: Results) -> list[float]:
-    return found.f1max_over_time
+def list_f1max_over_time(result: Results) -> list[float]:
+    return result.f1max_over_time
 
 
 def compute_spread(values: Sequence[float]) -> float:
@@ -351,38 +351,38 @@ def compute_spread(values: Sequence[float]) -> float:
 
 
 @BOOK.claim("share-over-time")
-def list_share_spreads(found: Results) -> list[float]:
-    pairs = zip(found.optima_over_time, found.f1max_over_time, strict=True)
+def list_share_spreads(result: Results) -> list[float]:
+    pairs = zip(result.optima_over_time, result.f1max_over_time, strict=True)
     ours = [best.verdict.indexes["f1_per_m2s"] / most for best, most in pairs]
     return [compute_spread([row.implied_f1 / row.f1max for row in TABLE_4]), compute_spread(ours)]
 
 
 @BOOK.claim("slows")
-def list_speeds_over_time(found: Results) -> list[list[float]]:
-    ours = [get_point(best)[0] for best in found.optima_over_time]
+def list_speeds_over_time(result: Results) -> list[list[float]]:
+    ours = [get_point(best)[0] for best in result.optima_over_time]
     pairs = list(zip(TABLE_4, ours, strict=True))[::-1]
     return [[row.s / row.step_time_s for row, _ in pairs], [s / row.step_time_s for row, s in pairs]]
 
 
 @BOOK.claim("f-over-time")
-def compute_f_spread(found: Results) -> float:
-    return compute_spread([best.verdict.objective for best in found.optima_over_time])
+def compute_f_spread(result: Results) -> float:
+    return compute_spread([best.verdict.objective for best in result.optima_over_time])
 
 
 @BOOK.claim("accuracy")
-def list_zmp_errors(found: Results) -> list[float]:
-    zmp = "exact" if found.reading == RAISED else found.zmp
+def list_zmp_errors(result: Results) -> list[float]:
+    zmp = "exact" if result.reading == RAISED else result.zmp
     points = [[follow(row.x, zmp=reading)["zmp_foot"] for reading in (zmp, "moment-free")] for row in TABLE_3]
     return [1e3 * float(np.linalg.norm(a - b, axis=1).max()) for a, b in points]
 
 
 @BOOK.claim("motor-mass")
-def compute_motor_mass(found: Results) -> float:
+def compute_motor_mass(result: Results) -> float:
     return float(ca.sum1(walk12_model.list_masses(load_point_mass_biped()))) / len(JOINTS)
 
 
 @BOOK.claim("ranges")
-def compute_unreachable_share(found: Results) -> float:
+def compute_unreachable_share(result: Results) -> float:
     problem, robot = load_walk12(), load_point_mass_biped()
     points = qmc.scale(qmc.Sobol(len(NAMES), rng=0).random(SAMPLES), problem.lower, problem.upper)
     (s, n, lift, bend), t = points.T[:, :, None], np.linspace(0.0, 1.0, 21)
@@ -397,7 +397,7 @@ def compute_unreachable_share(found: Results) -> float:
 
 
 @BOOK.claim("moments")
-def list_rod_changes(found: Results) -> list[float]:
+def list_rod_changes(result: Results) -> list[float]:
     robot, (phases, weights) = load_point_mass_biped(), (np.array(part).ravel() for part in make_rule("gauss", 20))
     m = np.array(walk12_model.list_masses(robot)).ravel()
     x, phase = SX.sym("x", len(NAMES)), SX.sym("phase")
@@ -430,9 +430,9 @@ def find_branch() -> float:
 
 
 @BOOK.claim("inverse-kinematics")
-def compute_leg_room(found: Results) -> float:
+def compute_leg_room(result: Results) -> float:
     robot, knees = load_point_mass_biped(), [JOINTS.index(name) for name in ("theta_3", "theta_10")]
-    gaits = [*(row.x for row in TABLE_3), *map(get_point, found.optima)]
+    gaits = [*(row.x for row in TABLE_3), *map(get_point, result.optima)]
     bent = max(float(follow(x)["q"][:, knees].max()) for x in gaits)
     thigh, shank = robot.thigh_m, robot.shank_m
     return 1e3 * (math.sqrt(thigh**2 + shank**2 + 2 * thigh * shank * math.cos(bent)) - find_branch())
@@ -447,9 +447,9 @@ def _bind_ranks() -> None:
         BOOK.claim(f"rank-{what}", runs=True, what=f"stable-{what}", scale=F1MAX)(list_ends)
 
 
-def list_ends(found: Results, what: str, scale: float) -> list[float]:
+def list_ends(result: Results, what: str, scale: float) -> list[float]:
     """Return f at the end of the GA's runs, times a scale; minus infinity without a feasible gait."""
-    runs = found.find_runs(what, "ga")
+    runs = result.find_runs(what, "ga")
     return [scale * run.verdict.objective if run.verdict.feasible else -math.inf for run in runs]
 
 
@@ -457,9 +457,9 @@ _bind_ranks()
 
 
 @BOOK.claim("epochs", runs=True)
-def compute_gain(found: Results) -> float:
+def compute_gain(result: Results) -> float:
     gains = []
-    for run in found.find_runs(f"{EPOCHS_WEIGHT:g}", "ga"):
+    for run in result.find_runs(f"{EPOCHS_WEIGHT:g}", "ga"):
         f = np.array(run.history.objective, dtype=float)
         epoch = int(np.searchsorted(run.history.evaluations, GA.population * (1 + CONVERGED_EPOCH)))
         gains.append(100 * float(1 - f[min(epoch, len(f) - 1)] / f[-1]))
@@ -510,12 +510,12 @@ def describe_yardstick(results: Mapping[str, Results]) -> str:
 
 @BOOK.effect("bounds")
 def describe_bounds(results: Mapping[str, Results]) -> str:
-    found = results[LITERAL]
-    pairs = [[found.best(f"{prefix}{w:g}").verdict.objective for prefix in ("unbent-", "")] for w in UNBENT_WEIGHTS]
+    result = results[LITERAL]
+    pairs = [[result.best(f"{prefix}{w:g}").verdict.objective for prefix in ("unbent-", "")] for w in UNBENT_WEIGHTS]
     words = ", ".join(
-        f"{w:g}: {new:.6f} instead of {own:.6f}" for w, (new, own) in zip(UNBENT_WEIGHTS, pairs, strict=True)
+        f"{w:g}: {new:.6f} instead of {bent:.6f}" for w, (new, bent) in zip(UNBENT_WEIGHTS, pairs, strict=True)
     )
-    return f"optimal f at λ = {words}; {compute_unreachable_share(found):.1f} % of the gaits within (7) do not reach at all"
+    return f"optimal f at λ = {words}; {compute_unreachable_share(result):.1f} % of the gaits within (7) do not reach at all"
 
 
 @BOOK.effect("branch")
@@ -542,9 +542,9 @@ def describe_jump(results: Mapping[str, Results]) -> str:
     return f"where steps meet it jumps by {math.pi * SECOND_ROW.n:.2f} m/s for the gait of λ = 0.15"
 
 
-def count_met(found: Results) -> int:
+def count_met(result: Results) -> int:
     """Return how many printed f of Table III our model meets within 1 %."""
-    return sum(abs(f / row.f - 1) <= 0.01 for f, row in zip(list_f(found, TABLE_3), TABLE_3, strict=True))
+    return sum(abs(f / row.f - 1) <= 0.01 for f, row in zip(list_f(result, TABLE_3), TABLE_3, strict=True))
 
 
 def make_tables(results: Mapping[str, Results]) -> list[Table]:
@@ -562,9 +562,9 @@ def make_tables(results: Mapping[str, Results]) -> list[Table]:
     columns = {"λ": ".2f", "paper: f": ".3f", **by_reading, "GA, median f": ".4f", "IPOPT: f": ".4f", **variables}
     fourth: list[list[Value]] = []
     for name in (LITERAL, SECOND):
-        found = results[name]
-        for row, most, best in zip(TABLE_4, found.f1max_over_time, found.optima_over_time, strict=True):
-            f = compute_f(row, row.f1max, **found.options)
+        result = results[name]
+        for row, most, best in zip(TABLE_4, result.f1max_over_time, result.optima_over_time, strict=True):
+            f = compute_f(row, row.f1max, **result.options)
             fourth.append([name, row.step_time_s, row.f1max, most, row.f, f, *_pair(row, best)])
     heads = {"reading": "", "T [s]": ".1f", "paper: f1max": ".1f", "IPOPT: f1max": ".1f", "paper: f": ".4f"}
     return [
@@ -578,9 +578,9 @@ def make_tables(results: Mapping[str, Results]) -> list[Table]:
     ]
 
 
-def _get_median(found: Results, row: PaperRow) -> float | None:
+def _get_median(result: Results, row: PaperRow) -> float | None:
     key = (_title(LITERAL, f"{row.weight:g}"), "ga")
-    return float(np.median(list_ends(found, f"{row.weight:g}", 1.0))) if key in found.runs else None
+    return float(np.median(list_ends(result, f"{row.weight:g}", 1.0))) if key in result.runs else None
 
 
 def _pair(row: PaperRow, best: RunRecord) -> list[Value]:
