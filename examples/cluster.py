@@ -12,9 +12,10 @@ from pathlib import Path
 
 from distributed import LocalCluster
 
+from compare.analysis.columns import summarise
 from compare.analysis.comparison import compare_problems
-from compare.analysis.solver_table import summarise
-from compare.drawing.comparison_figures import plot_final_gaps
+from compare.drawing.charts import plot_charts
+from compare.drawing.comparison_figures import chart_final_gaps
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Task
 
@@ -38,10 +39,10 @@ if __name__ == "__main__":
 if __name__ == "__main__":
     (comparison,) = compare_problems(records)
     for row in summarise(comparison):
-        print(f"{row.solver}: {row.feasible} of {row.runs} feasible, median {row.median:.6f} W")
+        print(f"{row['solver']}: {row['feasible']} of {row['runs']} feasible, median {row['median']:.6f} W")
 
 # %%
 # The gap of every run at its end.
 
-figure = plot_final_gaps(comparison) if __name__ == "__main__" else None
+figure = plot_charts(chart_final_gaps(comparison)) if __name__ == "__main__" else None
 figure

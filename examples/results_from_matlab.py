@@ -9,9 +9,10 @@ Each point is judged like all others. From the command line: `nlp-gait import na
 import csv
 from pathlib import Path
 
+from compare.analysis.columns import summarise
 from compare.analysis.comparison import compare_problems
-from compare.analysis.solver_table import summarise
-from compare.drawing.comparison_figures import plot_final_gaps
+from compare.drawing.charts import plot_charts
+from compare.drawing.comparison_figures import chart_final_gaps
 from compare.study.import_runs import import_runs
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Task
@@ -37,11 +38,11 @@ records = import_runs(spec, Path("finals.csv"), "paper (MATLAB)")
 tasks = [Task(problem=spec, solver=algorithm, run=k) for algorithm in ("ipopt", "pso") for k in range(3)]
 (comparison,) = compare_problems([*records, *run_study(Study(tasks=tuple(tasks)))])
 for row in summarise(comparison):
-    claim = "no claim" if row.best_claim is None else f"claims {row.best_claim:.4f} W"
-    print(f"{row.solver}: {row.feasible} of {row.runs} feasible, {claim}, judged {row.best:.4f} W at best")
+    claim = "no claim" if row["best_claimed"] is None else f"claims {row['best_claimed']:.4f} W"
+    print(f"{row['solver']}: {row['feasible']} of {row['runs']} feasible, {claim}, judged {row['best']:.4f} W at best")
 
 # %%
 # The gap of every run at its end.
 
-figure = plot_final_gaps(comparison)
+figure = plot_charts(chart_final_gaps(comparison))
 figure

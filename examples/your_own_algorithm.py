@@ -11,9 +11,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from compare.analysis.columns import format_rows
 from compare.analysis.comparison import compare_problems
-from compare.analysis.solver_table import HEADER, format_cells, summarise
-from compare.drawing.comparison_figures import plot_convergence
+from compare.drawing.charts import plot_charts
+from compare.drawing.comparison_figures import chart_convergence
 from compare.report.document import Document, make_text_table
 from compare.report.writing import render_markdown
 from compare.study.run_study import Study, run_study
@@ -65,11 +66,11 @@ class ShrinkingBoxSearch:
 problem, runs = ProblemSpec(name="nao-ssp"), {"shrinking-box": ShrinkingBox(), "pso": "pso", "ipopt": "ipopt"}
 tasks = [Task(problem=problem, solver=algorithm, run=k) for algorithm in runs.values() for k in range(5)]
 (comparison,) = compare_problems(run_study(Study(tasks=tuple(tasks))))
-table = make_text_table(HEADER, [format_cells(summary, comparison) for summary in summarise(comparison)])
+table = make_text_table(*format_rows(comparison))
 print(render_markdown(Document(title="A shrinking box", parts=[table])))
 
 # %%
 # The best gap so far over evaluations and seconds.
 
-figure = plot_convergence(comparison)
+figure = plot_charts(chart_convergence(comparison))
 figure

@@ -88,35 +88,35 @@ def _replace_pictures(name: str) -> Iterator[None]:
     from tests.compare import pictures  # Matplotlib takes half of the time of an empty run
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("compare.report.writing.save", getattr(pictures, name))
+        patch.setattr("compare.report.writing.render_svg", getattr(pictures, name))
         yield
 
 
 @pytest.fixture(scope="module")
 def coarse_pages() -> Iterator[None]:
     """Draw each picture of a page once and small, for files whose tests do not measure the pictures of their pages."""
-    with _replace_pictures("save_coarsely"):
+    with _replace_pictures("render_coarsely"):
         yield
 
 
 @pytest.fixture
 def coarse_pictures() -> Iterator[None]:
     """Do so for a test."""
-    with _replace_pictures("save_coarsely"):
+    with _replace_pictures("render_coarsely"):
         yield
 
 
 @pytest.fixture(scope="module")
 def undrawn_pages() -> Iterator[None]:
     """Draw none, for files about commands and records, whose pictures are drawn by the tests of reports and questions."""
-    with _replace_pictures("save_undrawn"):
+    with _replace_pictures("render_nothing"):
         yield
 
 
 @pytest.fixture
 def undrawn_pictures() -> Iterator[None]:
     """Do so for a test."""
-    with _replace_pictures("save_undrawn"):
+    with _replace_pictures("render_nothing"):
         yield
 
 

@@ -35,11 +35,3 @@ def describe_value(known: Reference, value: float | None, objective: Objective, 
         )
     distance = format_percent(max(compute_gap(value, known.objective, objective), 0.0))
     return f"Best known value: {best}; {what} is {distance} from it"
-
-
-def describe_bound(bound: float, best: float, unit: str) -> str:
-    """Describe a proven bound, such as ``no feasible point is better than 0.837410 W, 1 % from it``."""
-    if is_zero(best):
-        return f"no feasible point is better than {with_unit(bound, unit)} (proven)"
-    gap = 100 * abs(bound - best) / abs(best)
-    return f"no feasible point is better than {with_unit(bound, unit)}, {gap:.2g} % from it (proven)"

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.best_known import ZERO, compute_gap, is_zero
+from compare.analysis.pairs import Pair, Sample, compare_pairs
 from compare.analysis.record_statistics import (
     Curve,
     Weighting,
@@ -20,9 +21,10 @@ from compare.analysis.record_statistics import (
     tie,
 )
 from compare.analysis.units import format_percent, with_unit
-from compare.study.definition import describe_edition, select_shared
+from compare.study.definition import SOURCE, describe_edition, select_shared
 from compare.study.record import RunRecord
 from compare.study.references import BETTER, Reference, find_reference
+from compare.study.task import FUNCTION, GRADIENT_SOLVERS
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
@@ -31,6 +33,7 @@ from nlp_gait.formulation import Objective
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
 DEFAULT_WEIGHTING = Weighting()
+FOUND = 1e-6  # a run with at most this gap has reached the best known value
 # An edition's name is a label, so that files can be named after it.
 NOT_IN_LABELS = re.compile(r"[^A-Za-z0-9._+: -]")
 LONGEST = 30
@@ -54,6 +57,16 @@ class SolverRuns:
     def median_cost(self) -> float:
         """Over all runs, infinite if half of them or more are infeasible."""
         return median(self.costs)
+
+    @property
+    def is_gradient(self) -> bool:
+        """Whether its runs are starts of a gradient method."""
+        return all(r.definition["solver"] in GRADIENT_SOLVERS and "polishes" not in r.definition for r in self.records)
+
+    @property
+    def is_user_defined(self) -> bool:
+        """Whether it is the user's own: code, a program, or imported results."""
+        return any("imported" in r.definition or SOURCE in (r.definition.get("solver") or {}) for r in self.records)
 
     @property
     def best(self) -> RunRecord | None:
@@ -106,10 +119,26 @@ class Comparison:
         """Return a cost as an objective in the problem's sense."""
         return self.objective.sign * cost
 
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """Tests of all pairs of solvers; differences within the judge's tolerance are ties."""
+        samples = []
+        tied = tie([solver.costs for solver in self.solvers], self.reference)
+        for solver, costs in zip(self.solvers, tied, strict=True):
+            paired = {r.seed: cost for r, cost in zip(solver.records, costs, strict=True) if _shares_start(r)}
+            samples.append(Sample(solver=solver.name, costs=costs, paired=paired))
+        return compare_pairs(samples)
+
     @property
-    def tied_costs(self) -> list[list[float]]:
-        """Costs of the runs of each solver, equal where they differ by no more than the judge's tolerance."""
-        return tie([solver.costs for solver in self.solvers], self.reference)
+    def leaders(self) -> set[str]:
+        """Solver with the best median and those that do not differ from it significantly; empty without any test."""
+        from_leader = [pair for pair in self.pairs if pair.first == self.solvers[0].name]
+        others = {pair.second for pair in from_leader if not pair.is_significant}
+        return {self.solvers[0].name, *others} if from_leader else set()
+
+    def count_reached(self, solver: SolverRuns) -> int:
+        """Return the number of runs of a solver that reach the best known value."""
+        return sum(len(curve.gap) > 0 and curve.gap.min() <= FOUND for curve in solver.curves)
 
     def format_gap(self, gap: float | None) -> str:
         """Format a gap in percent, 0 within the judge's tolerance, or in the objective's unit from a value near zero."""
@@ -175,6 +204,13 @@ def index_solvers(comparisons: Sequence[Comparison]) -> tuple[list[dict[str, Sol
     """Return the solvers of each comparison by name, and the names of those that ran on all problems."""
     found = [{solver.name: solver for solver in comparison.solvers} for comparison in comparisons]
     return found, [name for name in found[0] if all(name in solvers for solvers in found)] if found else []
+
+
+def _shares_start(record: RunRecord) -> bool:
+    """Return whether a run starts from the points that searches with its seed share."""
+    if record.settings.get("kind") == FUNCTION:  # it receives no starting points
+        return False
+    return "handling" in record.definition or "polishes" in record.definition
 
 
 def read_objective(record: RunRecord) -> Objective:

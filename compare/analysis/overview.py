@@ -1,16 +1,13 @@
-"""Solvers over many problems: mean ranks with Friedman's test and the critical difference, wins against others, the verdict."""
+"""Solvers over many problems: mean ranks with Friedman's test and the critical difference, wins against others."""
 
 import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import median
 
-from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
+from compare.analysis.comparison import Comparison, index_solvers
+from compare.analysis.pairs import SIGNIFICANT, Pair
 from compare.analysis.record_statistics import tie
-from compare.analysis.units import format_percent, join_words
-from compare.analysis.verdict import FOUND, SIGNIFICANT, Pair, compare_pairs
-from compare.study.definition import SOURCE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,55 +61,20 @@ def count_wins(comparisons: Sequence[Comparison], solver: str) -> list[Score]:
     """Return how often a solver is significantly better or worse than each other one that has as many runs to test."""
     tested: dict[str, list[Pair]] = {}
     for comparison in comparisons:
-        for pair in compare_pairs(comparison):
+        for pair in comparison.pairs:
             if solver in (pair.first, pair.second):
                 tested.setdefault(pair.second if pair.first == solver else pair.first, []).append(pair)
     scores = []
     for other, pairs in tested.items():
-        better = Counter(pair.first for pair in pairs if pair.rank_sum < SIGNIFICANT)
+        better = Counter(pair.first for pair in pairs if pair.is_significant)
         wins, losses = better[solver], better[other]
         scores.append(Score(other=other, wins=wins, ties=len(pairs) - wins - losses, losses=losses))
     return scores
 
 
-def _compute_median_gap(comparison: Comparison, solver: SolverRuns) -> float:
-    """Return the gap of the median, infinite if half of the runs or more are infeasible."""
-    return comparison.gap(solver.median_cost) if math.isfinite(solver.median_cost) else math.inf
-
-
 def list_user_solvers(comparisons: Sequence[Comparison]) -> list[str]:
-    """Return the names of solvers that are the user's own: code, a program, or imported results."""
-    records = [record for comparison in comparisons for record in comparison.records]
-    own = (r.solver for r in records if "imported" in r.definition or SOURCE in (r.definition.get("solver") or {}))
-    return list(dict.fromkeys(own))
-
-
-def write_overall_verdict(comparisons: Sequence[Comparison], ranking: Ranking) -> tuple[str, ...]:
-    """Return at most five sentences over many problems."""
-    found, names = index_solvers(comparisons)
-    sentences = []
-    if ranking.mean_ranks:
-        ranks = join_words(f"{name} {rank:.2f}" for name, rank in ranking.mean_ranks.items())
-        sentences.append(
-            f"Mean rank of the medians over {len(comparisons)} problems: {ranks}. {describe_tests(ranking)}".strip()
-        )
-        gaps = {
-            name: [_compute_median_gap(c, s[name]) for c, s in zip(comparisons, found, strict=True)] for name in names
-        }
-        middle = ((name, median(gaps[name])) for name in ranking.mean_ranks)
-        typical = join_words(
-            f"{name} {format_percent(0.0 if gap <= FOUND else gap) if math.isfinite(gap) else 'mostly infeasible'}"
-            for name, gap in middle
-        )
-        sentences.append(f"Median over the problems of the median gap: {typical}.")
-    reached = Counter(s.name for c in comparisons for s in c.solvers if s.feasible and c.gap(s.feasible[0]) <= FOUND)
-    best = join_words(f"{name} on {number}" for name, number in reached.most_common())
-    sentences.append(f"Best known value reached to 1e-6, of {len(comparisons)} problems: {best or 'none'}.")
-    for solver in list_user_solvers(comparisons)[:1]:
-        against = join_words(f"{r.wins}-{r.ties}-{r.losses} against {r.other}" for r in count_wins(comparisons, solver))
-        sentences += [f"Wins, ties and losses of {solver}: {against}."] if against else []
-    better = join_words(c.problem for c in comparisons if c.better is not None)
-    return (*sentences, *([f"A new best known value was found on {better}."] if better else []))
+    """Return the names of solvers that are the user's own."""
+    return list(dict.fromkeys(s.name for c in comparisons for s in c.solvers if s.is_user_defined))
 
 
 def describe_tests(ranking: Ranking) -> str:

@@ -3,18 +3,20 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from compare.analysis.columns import format_count
 from compare.analysis.comparison import Comparison, compare_problems, index_solvers
 from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
-from compare.analysis.solver_table import count
 from compare.bench.baseline import EVALUATIONS, get_reference, load_baseline
-from compare.drawing.comparison_figures import plot_suite_ecdf
+from compare.drawing.charts import encode_charts, plot_charts
+from compare.drawing.comparison_figures import chart_suite_ecdf
 from compare.report.document import Document, Figure, Section, Table, make_text_table
 from compare.report.provenance import TERMS
-from compare.report.solver_sections import make_wins_table
+from compare.report.study_sections import make_wins_table
 from compare.study.record import RunRecord
 from nlp_gait import gaitbench
 
@@ -100,18 +102,19 @@ def make_leaderboard_page(
     count_of = len(board.comparisons)
     runs = sorted({len(solver.records) for comparison in board.comparisons for solver in comparison.solvers})
     targets = ", ".join(f"{100 * target:g} %" for target in TARGETS)
+    charts = chart_suite_ecdf(board.comparisons)
     title = f"GaitBench, {suite}: {count_of} instances, {len(board.standings)} solvers"
     return Document(
         title=title if solver is None else f"{solver} on {title}",
-        verdict=() if solver is None else make_verdict(board, solver),
+        headline=() if solver is None else make_verdict(board, solver),
         parts=(
-            TERMS,
             _make_standings_table(board),
             Figure(
                 name="gaitbench-runtime",
                 caption="Share of all triples of instance, run and target solved within a number of evaluations per variable; "
                 "31 targets, from 100 % to 1e-4 % above the best known.",
-                drawing=plot_suite_ecdf(board.comparisons),
+                drawing=partial(plot_charts, charts),
+                data=encode_charts(charts),
             ),
             *(() if solver is None else (make_wins_table(board.comparisons, solver),)),
             Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),
@@ -123,6 +126,7 @@ def make_leaderboard_page(
                     "the same budget and both within 60 s. What counts is the exact functions' verdict. The mean rank is that of "
                     f"the expected running time over all instances and the targets {targets} above the best known; equals share "
                     "a rank, and pairs that no solver reached are left out.",
+                    TERMS,
                 ),
             ),
         ),
@@ -176,10 +180,10 @@ def _make_instance_row(comparison: Comparison, solver: str | None) -> tuple[str,
     cheapest = min(costs, key=lambda name: costs[name])
     known = math.isfinite(costs[cheapest])
     size, best = str(len(instance.names)), f"{comparison.reference:.6g}"
-    row = (comparison.problem, size, best, cheapest if known else "-", count(costs[cheapest]))
+    row = (comparison.problem, size, best, cheapest if known else "-", format_count(costs[cheapest]))
     if solver is None:
         return row
     runs = next(s for s in comparison.solvers if s.name == solver)
     rank = 1 + sum(cost < costs[solver] for cost in costs.values())
     place = str(rank) if math.isfinite(costs[solver]) else "-"
-    return (*row, comparison.format_gap(comparison.gap(runs.median_cost)), count(costs[solver]), place)
+    return (*row, comparison.format_gap(comparison.gap(runs.median_cost)), format_count(costs[solver]), place)

@@ -2,18 +2,19 @@
 
 import inspect
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from typer import Argument, Option
 
+from compare.analysis.columns import PRINTED, format_rows, summarise
 from compare.analysis.comparison import compare_problems
-from compare.analysis.solver_table import HEADER, describe_unknown, find_failures, format_cells, summarise
+from compare.analysis.failures import describe_unknown, find_failures
+from compare.analysis.headline import write_headlines
 from compare.analysis.tuning import tune_solvers
 from compare.analysis.units import with_unit
-from compare.analysis.verdict import describe_best_known
 from compare.cli import options
 from compare.cli.command import OUTPUT, SESSION, command, get_marks, report_interrupts
 from compare.cli.printing import Output, Rows, describe_command, say, say_error, show_progress, stderr
@@ -152,6 +153,7 @@ def compare(
         data={"problems": summarise_problems(records), "runs": [_encode_run(record) for record in records]},
         parts=[*_tabulate_runs(records), *describe_summaries(records)],
         written=written,
+        answer=write_headlines(compare_problems(records)),
         failures=[*list_excluded(imported.sentences), *([remedy] if lost else [])],
     )
 
@@ -198,7 +200,7 @@ def list_excluded(excluded: Sequence[str]) -> list[str]:
 
 def summarise_problems(records: Sequence[RunRecord]) -> dict[str, Any]:
     """Return the table of solvers by problem as plain data."""
-    return {c.problem: [asdict(summary) for summary in summarise(c)] for c in compare_problems(records)}
+    return {comparison.problem: summarise(comparison) for comparison in compare_problems(records)}
 
 
 ENCODED = "problem solver run seed claimed_objective claimed_violation failed_evaluations status x verdict".split()
@@ -224,23 +226,15 @@ def _tabulate_runs(records: Sequence[RunRecord]) -> Iterator[Rows]:
         yield Rows(f"{comparison.problem}: runs", header, rows)
 
 
-# Columns that are printed, in reading order; the report has all.
-READ_FIRST = ("solver", "feasible", "median gap", "median", "evaluations", "time per run")
-HOW_TO_READ = "From left to right: feasible runs, gap of the median to the best known, costs."
-
-
 def describe_summaries(records: Sequence[RunRecord]) -> Iterator[str | Rows]:
     """Yield the table of solvers for each problem."""
     for comparison in compare_problems(records):
-        cells = [dict(zip(HEADER, format_cells(s, comparison), strict=True)) for s in summarise(comparison)]
-        rows = [[row[name] for name in READ_FIRST] for row in cells]
-        yield Rows(f"{comparison.problem}: judged by the exact functions", READ_FIRST, rows)
+        yield Rows(f"{comparison.problem}: judged by the exact functions", *format_rows(comparison, PRINTED))
         failures = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in find_failures(comparison.records)]
         if failures:
             yield Rows("Failed runs", ("solver", "failed", "reason of the first"), failures)
-        for sentence in (*describe_unknown(comparison), f"best known: {describe_best_known(comparison)}"):
+        for sentence in describe_unknown(comparison):
             yield f"{comparison.problem}, {sentence}"
-    yield HOW_TO_READ
 
 
 def _reject_study_options(context: typer.Context, flag: str) -> None:

@@ -41,6 +41,7 @@ class Output:
     data: Mapping[str, Any]  #: for --json
     parts: Sequence[str | Rows] = ()  #: sentences and tables for people
     written: Iterable[Path] = ()
+    answer: Sequence[str] = ()  #: sentences that are printed last
     failures: Sequence[str] = ()  #: sentences by which the command ends with status 1
     interrupted: str = ""  #: the sentence after Ctrl-C, by which it ends with status 130
 
@@ -105,6 +106,8 @@ def print_output(output: Output, as_json: bool) -> None:
             print_table(*part)
     for path in output.written:
         stdout.print(f"wrote {path}", soft_wrap=True)
+    for sentence in output.answer:
+        stdout.print(sentence, soft_wrap=True)
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -286,7 +286,7 @@ def write_answer(answer: Answer, out: Path, stopped: str = "", problems: Sequenc
             failures.append(str(error))
     if pressed() and not stopped:
         stopped = "interrupted at the end"
-    parts: list[str | Rows] = [answer.title, *answer.verdict]
+    parts: list[str | Rows] = [answer.title, *answer.headline]
     for part in iterate_leaves(answer.parts):
         if isinstance(part, str):
             parts.append(part)

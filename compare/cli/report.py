@@ -9,6 +9,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from compare.analysis.comparison import compare_problems, label_editions
+from compare.analysis.failures import describe_unknown
 from compare.analysis.record_statistics import Weighting
 from compare.analysis.simulated_gaits import (
     GAIT_HEADER,
@@ -18,7 +19,6 @@ from compare.analysis.simulated_gaits import (
     measure_agreement,
     select_best_gaits,
 )
-from compare.analysis.solver_table import describe_unknown
 from compare.cli.command import OUTPUT, command, describe_stored, report_interrupts
 from compare.cli.compare import list_excluded
 from compare.cli.options import Code, Scheduler, name_all, parse_numbers
@@ -41,7 +41,7 @@ ENGINE_TABLE = (
 WEIGHTS = "Evaluations counted for a first derivative and a Hessian (default: n + 1, (n + 1)(n + 2)/2)."
 CSV = "Write all runs and all judged points as CSV files too."
 LATEX = "Also write a table of each problem for papers (LaTeX, package booktabs)."
-PDF = "Also write figures for papers, one column wide, and their captions in LaTeX."
+FIGURES = "Also write all figures as PNG, and for papers as PDF, one column wide, with captions in LaTeX."
 LOGS = "Also write the runs as logs for iohinspector, into the folder logs."
 WATCH = "Rewrite the report while the study runs; the open page reloads itself."
 OUT = "Folder for the report, its tables and figures; results stored in it are used again."
@@ -58,7 +58,7 @@ def report(
         bool, Option("--engine", help="Simulate every solver's best gait in MuJoCo (extra sim), unless stored.")
     ] = False,
     latex: Annotated[bool, Option("--latex", help=LATEX)] = False,
-    pdf: Annotated[bool, Option("--pdf", help=PDF)] = False,
+    figures: Annotated[bool, Option("--figures", help=FIGURES)] = False,
     logs: Annotated[bool, Option("--logs", help=LOGS)] = False,
     code: Code = None,
     csv: Annotated[bool, Option("--csv", help=CSV)] = False,
@@ -84,7 +84,7 @@ def report(
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = label_editions(evidence.records)
     simulated = _simulate_best(folder, records) if engine else []
-    further = FurtherFiles(csv=csv, latex=latex, pdf=pdf)
+    further = FurtherFiles(csv=csv, latex=latex, figures=figures)
     written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
     if logs:
         comparisons = compare_problems(records)

@@ -1,4 +1,4 @@
-"""Stick figures: a gait in 3D, from the side, the front and above, as frames of a video, or some poses as a figure."""
+"""Stick figures: a gait in 3D, from the side, the front and above, as frames of a video."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compare.drawing.figures import make_figure, use_style
-from nlp_gait.formulation import Array
-from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Skeleton, Sole
+from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Skeleton
 from nlp_gait.interrupts import delay_interrupts
 from nlp_gait.simulation.video import Frame
 
@@ -50,28 +49,6 @@ def draw_frames(skeleton: Skeleton) -> Iterator[Frame]:
             yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
 
 
-def plot_poses(skeleton: Skeleton, times_s: Sequence[float], views: Sequence[str]) -> Figure:
-    """Plot one row per view and one column per instant, at the nearest sample."""
-    chosen = [int(np.abs(skeleton.t - time).argmin()) for time in times_s]
-    low, high = skeleton.box()
-    widths, heights = ([float((high - low)[VIEWS[view][i]] + 2 * MARGIN) for view in views] for i in (0, 1))
-    with use_style():
-        rows_in = [0.35 + 1.45 * height / max(widths) for height in heights]
-        figure = make_figure(1.6 * len(chosen), 0.95 + sum(rows_in))
-        axes = figure.subplots(len(views), len(chosen), squeeze=False, sharey="row", height_ratios=heights)
-        for row, view in zip(axes, views, strict=True):
-            for axis, k in zip(row, chosen, strict=True):
-                _draw_view(axis, skeleton, k, view)
-                if axis is not row[0]:
-                    axis.set_ylabel("")
-        for axis, k in zip(axes[0], chosen, strict=True):
-            axis.set_title(f"{skeleton.t[k]:.2f} s")
-        handles = _make_legend(skeleton, views)
-        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 1 + len(chosen)))
-        figure.suptitle(skeleton.title, fontsize=9)
-    return figure
-
-
 def _draw_frame(figure: Figure, skeleton: Skeleton, k: int) -> None:
     figure.text(0.01, 0.985, f"{skeleton.t[k]:.2f} s   {skeleton.title}", fontsize=10, va="top")
     views, corner = (["side"], PLANAR_LEGEND_CORNER) if skeleton.planar else (list(VIEWS), LEGEND_CORNER)
@@ -110,17 +87,13 @@ def _draw_view(axis: Axes, skeleton: Skeleton, k: int, view: str) -> None:
 def _draw_pose(axis: Any, skeleton: Skeleton, k: int, seen: Sequence[int], opacity: float = 1.0) -> None:
     """Draw soles, limbs, centre of mass and ZMP at sample k in axes of two or three dimensions with these coordinates."""
     for sole in skeleton.soles:
-        axis.plot(*close_outline(sole, k)[:, seen].T, color=COLOURS[sole.side], lw=1.0)
+        outline = np.concatenate([sole.corners[k], sole.corners[k, :1]])
+        axis.plot(*outline[:, seen].T, color=COLOURS[sole.side], lw=1.0)
     for limb in skeleton.limbs:
         axis.plot(*limb.points[k][:, seen].T, color=COLOURS[limb.side], marker="o", ms=2.5, alpha=opacity)
     for points, colour, marker in ((skeleton.com, COM, "o"), (skeleton.zmp, ZMP, "X")):
         if points is not None:
             axis.plot(*points[k : k + 1, seen].T, color=colour, marker=marker, ms=5, ls="none", zorder=5)
-
-
-def close_outline(sole: Sole, k: int) -> Array:
-    """Return the corners of a sole at sample k, the first one repeated at the end, (N, 3) [m]."""
-    return np.concatenate([sole.corners[k], sole.corners[k, :1]])
 
 
 def _draw_3d(axis: Any, skeleton: Skeleton, k: int) -> None:

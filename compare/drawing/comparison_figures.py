@@ -1,4 +1,7 @@
-"""Figures of a comparison: gaps over costs, shares of solved targets, final gaps of runs, solvers over problems."""
+"""Figures of a comparison: gaps over costs, shares of solved targets, final gaps of runs, solvers over problems.
+
+A figure is a function from a comparison to charts; ``compare.drawing.charts`` draws them.
+"""
 
 from __future__ import annotations
 
@@ -10,81 +13,101 @@ import numpy as np
 from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
 from compare.analysis.overview import Ranking
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS, compute_band, compute_ecdf, compute_profiles
-from compare.drawing.figures import (
-    Look,
-    add_legend_below,
-    assign_looks,
-    make_axes,
-    make_figure,
-    use_log_axes,
-    use_style,
-)
+from compare.analysis.units import format_percent
+from compare.drawing.charts import Chart, Series
+from compare.drawing.figures import assign_looks, make_axes, use_style
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Relative gaps below this are drawn at this value: solvers' tolerances are near it.
 SMALLEST_GAP = FEASIBILITY_TOLERANCE
-GRID_POINTS = 300
-Draw = Callable[["Axes", SolverRuns, Look, str], None]
+GRID_POINTS = 120
 AXES = {"evaluations": "equivalent evaluations", "seconds": "seconds of the solve"}
+GAP = "gap to the best known [%]"
+SHARES = (0.0, 1.02)  # range of an axis
 
 
-def plot_convergence(comparison: Comparison, *, column: bool = False) -> Figure:
-    """Plot bands from the least to the greatest gap of all runs, with the median, over evaluations and seconds.
+def chart_final_gaps(comparison: Comparison) -> list[Chart]:
+    """Return the final gap of each run, one row per solver, its median as a bar and the judge's tolerance as a line."""
+    series, rows = [], []
+    for place, solver in enumerate(comparison.solvers):
+        height = len(comparison.solvers) - place
+        gaps = np.array([comparison.gap(cost) for cost in solver.costs])
+        known = np.isfinite(gaps)
+        runs = [record.run for record, is_known in zip(solver.records, known, strict=True) if is_known]
+        notes = [f"{solver.name}, run {run}: {format_percent(gap)}" for run, gap in zip(runs, gaps[known], strict=True)]
+        x, y = clip_percent(gaps[known]), np.full(len(runs), float(height))
+        series.append(Series(name=solver.name, x=x, y=y, shape="points", notes=notes))
+        if np.isfinite(middle := comparison.gap(solver.median_cost)):
+            bar = clip_percent(np.array([middle, middle]))
+            series.append(Series(name=solver.name, x=bar, y=np.array([height - 0.35, height + 0.35])))
+        missing = len(gaps) - len(runs)
+        rows.append(f"{solver.name}, {missing} infeasible" if missing else solver.name)
+    limits = (0.4, len(rows) + 0.6)
+    mark = 100.0 * FEASIBILITY_TOLERANCE
+    return [Chart(x=GAP, y="", series=series, log=(True, False), rows=rows, range=limits, mark=mark)]
+
+
+def chart_convergence(comparison: Comparison) -> list[Chart]:
+    """Return bands from the least to the greatest gap of all runs, with the median, over evaluations and over seconds.
 
     A line begins where half of the runs are feasible, a band where all are. A run of a gradient method is a point at its end.
-    A figure for a printed column shows evaluations alone and has the width of the style's ``figure.figsize``.
     """
-    return plot_by_cost(comparison, _draw_gaps, "gap to the best known [%]", both=True, column=column)
+    return _chart_by_cost(comparison, _trace_gaps, GAP, (True, True))
 
 
-def plot_by_cost(comparison: Comparison, draw: Draw, words: str, both: bool = False, *, column: bool = False) -> Figure:
-    """Plot over evaluations and over seconds; ``draw`` receives the axes, a solver, its look and the kind of cost."""
-    look = assign_looks([solver.name for solver in comparison.solvers])
-    with use_style():
-        shown = ["evaluations"] if column else list(AXES)
-        figure = make_figure(None if column else 7.4, 2.8)
-        for axes, axis in zip(figure.subplots(1, len(shown), sharey=True, squeeze=False)[0], shown, strict=True):
-            for solver in comparison.solvers:
-                if solver.has_costs(axis):
-                    draw(axes, solver, look[solver.name], axis)
-            axes.set_xlabel(AXES[axis])
-            use_log_axes(axes, both)
-        figure.axes[0].set_ylabel(words)
-        add_legend_below(figure)
-    return figure
+def chart_ecdf(comparison: Comparison) -> list[Chart]:
+    """Return the share of all pairs of run and target solved within a cost, in evaluations and in seconds."""
+
+    def trace(solver: SolverRuns, axis: str) -> list[Series]:
+        last = max([c.total_cost(axis) for s in comparison.solvers if s.has_costs(axis) for c in s.curves] + [1e-3])
+        costs = np.array([c.cost_to_reach(target, axis) for c in solver.curves for target in ECDF_TARGETS])
+        return [_make_share(solver.name, *compute_ecdf(costs), last)]
+
+    return _chart_by_cost(comparison, trace, "share of runs and targets", (True, False), SHARES)
 
 
-def _draw_gaps(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
-    if any(len(curve.gap) > 1 for curve in solver.curves):
-        _draw_band(axes, solver, look, axis)
-        return
-    ends = [(c.total_cost(axis), float(c.gap[-1])) for c in solver.curves if len(c.gap) and np.isfinite(c.gap[-1])]
-    label = f"{solver.name}, {len(ends)} of {len(solver.curves)} runs"
-    cost, gap = np.array(ends).T if ends else (np.empty(0), np.empty(0))
-    axes.plot(cost, clip_percent(gap), look.marker, color=look.colour, label=label, markerfacecolor="none")
+def _chart_by_cost(
+    comparison: Comparison,
+    trace: Callable[[SolverRuns, str], list[Series]],
+    y: str,
+    log: tuple[bool, bool],
+    limits: tuple[float, float] | None = None,
+) -> list[Chart]:
+    """Return a chart over evaluations and one over seconds; ``trace`` takes a solver and the kind of cost."""
+    return [
+        Chart(
+            x=words,
+            y=y,
+            series=[s for solver in comparison.solvers if solver.has_costs(axis) for s in trace(solver, axis)],
+            log=log,
+            range=limits,
+        )
+        for axis, words in AXES.items()
+    ]
 
 
-def _draw_band(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
-    costs = [getattr(c, axis) for c in solver.curves]
+def _trace_gaps(solver: SolverRuns, axis: str) -> list[Series]:
+    costs = [getattr(curve, axis) for curve in solver.curves]
+    if all(len(curve.gap) <= 1 for curve in solver.curves):
+        ends = [(cost[-1], c.gap[-1]) for cost, c in zip(costs, solver.curves, strict=True) if len(cost)]
+        x, gap = np.array([end for end in ends if np.isfinite(end[1])]).reshape(-1, 2).T
+        return [Series(name=solver.name, x=x, y=clip_percent(gap), shape="points")]
     used = np.concatenate(costs)
     used = used[used > 0.0]
-    label = f"{solver.name}, {len(costs)} runs"
     if not used.size:
-        axes.plot([], [], color=look.colour, linestyle=look.line, label=label)
-        return
+        return []
     grid = np.geomspace(used.min(), used.max(), GRID_POINTS)
-    best_so_far = [np.minimum.accumulate(c.gap) for c in solver.curves]
-    low, middle, high = compute_band(costs, best_so_far, grid)
+    low, middle, high = compute_band(costs, [np.minimum.accumulate(curve.gap) for curve in solver.curves], grid)
     known, whole = np.isfinite(middle), np.isfinite(high)
-    axes.plot(grid[known], clip_percent(middle[known]), color=look.colour, linestyle=look.line, label=label)
-    axes.fill_between(
-        grid[whole], clip_percent(low[whole]), clip_percent(high[whole]), color=look.colour, alpha=0.15, linewidth=0
-    )
+    upper = clip_percent(high[whole])
+    return [
+        Series(name=solver.name, x=grid[whole], y=clip_percent(low[whole]), upper=upper, shape="band"),
+        Series(name=solver.name, x=grid[known], y=clip_percent(middle[known])),
+    ]
 
 
 def clip_percent(gap: Array) -> Array:
@@ -92,80 +115,45 @@ def clip_percent(gap: Array) -> Array:
     return 100.0 * np.maximum(gap, SMALLEST_GAP)
 
 
-def plot_ecdf(comparison: Comparison, *, column: bool = False) -> Figure:
-    """Plot the share of all pairs of run and target solved within a cost, in evaluations and in seconds."""
-
-    def draw(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
-        last = max([c.total_cost(axis) for s in comparison.solvers if s.has_costs(axis) for c in s.curves] + [1e-3])
-        costs = np.array([c.cost_to_reach(target, axis) for c in solver.curves for target in ECDF_TARGETS])
-        at, share = compute_ecdf(costs)
-        _draw_share(axes, at, share, solver.name, look, last)
-
-    return plot_by_cost(comparison, draw, "share of runs and targets", column=column)
+def _make_share(name: str, costs: Array, share: Array, last: float) -> Series:
+    """Return a share that rises at some costs, up to a last cost."""
+    if costs.size:
+        costs, share = np.append(costs, max(last, costs[-1])), np.append(share, share[-1])
+    return Series(name=name, x=costs, y=share, shape="step")
 
 
-def plot_suite_ecdf(comparisons: Sequence[Comparison]) -> Figure:
-    """Plot the share of problems, runs and targets solved within evaluations per variable; solvers that ran on all."""
+def chart_suite_ecdf(comparisons: Sequence[Comparison]) -> list[Chart]:
+    """Return the share of problems, runs and targets solved within evaluations per variable; solvers that ran on all."""
     solvers, shared = index_solvers(comparisons)
-    with use_style():
-        figure, axes = make_axes(7.4, 3.6)
-        drawn = {}
-        for name in shared:
-            runs = [(curve, len(s[name].records[0].x) or 1) for s in solvers for curve in s[name].curves]
-            costs = np.array([curve.cost_to_reach(target) / n for curve, n in runs for target in ECDF_TARGETS])
-            drawn[name] = (*compute_ecdf(costs), max([curve.total_cost() / n for curve, n in runs] + [1.0]))
-        last = max(end for _, _, end in drawn.values())
-        best_first = sorted(drawn, key=lambda name: -drawn[name][1][-1] if drawn[name][1].size else 0.0)
-        for name, look in assign_looks(best_first).items():
-            _draw_share(axes, *drawn[name][:2], name, look, last)
-        axes.set_xlabel("equivalent evaluations per variable")
-        axes.set_ylabel("share of problems, runs and targets")
-        use_log_axes(axes)
-        add_legend_below(figure)
-    return figure
+    shares, last = {}, 1.0
+    for name in shared:
+        runs = [(curve, len(s[name].records[0].x) or 1) for s in solvers for curve in s[name].curves]
+        costs = np.array([curve.cost_to_reach(target) / n for curve, n in runs for target in ECDF_TARGETS])
+        shares[name] = compute_ecdf(costs)
+        last = max([last, *(curve.total_cost() / n for curve, n in runs)])
+    best_first = sorted(shares, key=lambda name: -shares[name][1][-1] if shares[name][1].size else 0.0)
+    series = [_make_share(name, *shares[name], last) for name in best_first]
+    words = "share of problems, runs and targets"
+    return [Chart(x="equivalent evaluations per variable", y=words, series=series, log=(True, False), range=SHARES)]
 
 
-def plot_final_gaps(comparison: Comparison, *, column: bool = False) -> Figure:
-    """Plot the final gap of each run, one row per solver; infeasible runs are counted at the right edge."""
-    with use_style():
-        figure, axes = make_axes(None if column else 7.4)
-        figure.set_figheight(0.8 + 0.28 * len(comparison.solvers))
-        names = [solver.name for solver in comparison.solvers]
-        for row, (solver, look) in enumerate(zip(comparison.solvers, assign_looks(names).values(), strict=True)):
-            gaps = np.array([comparison.gap(cost) for cost in solver.costs])
-            known = np.isfinite(gaps)
-            shown = clip_percent(gaps[known])
-            axes.plot(shown, [row] * len(shown), look.marker, color=look.colour, markerfacecolor="none", alpha=0.8)
-            if known.any():
-                axes.plot(np.median(shown), row, "|", color=look.colour, markersize=16, markeredgewidth=2)
-            missing = int((~known).sum())
-            if missing:
-                beside = axes.get_yaxis_transform()
-                axes.text(
-                    1.0, row, f"{missing} infeasible", transform=beside, ha="right", va="center", fontsize="small"
-                )
-        use_log_axes(axes)
-        axes.set_xlabel("gap to the best known at the end [%], bars: medians")
-        axes.set_yticks(range(len(names)), names)
-        axes.set_ylim(len(names) - 0.5, -0.5)
-    return figure
+def chart_performance_profile(comparisons: Sequence[Comparison]) -> list[Chart]:
+    """Return the performance profile of expected running times over problems and targets; solvers that ran on all."""
+    profile = compute_profiles(list_expected_costs(comparisons))
+    last = max([factor[-1] for factor, _ in profile.values() if factor.size], default=1.0) * 2.0
+    series = [_make_share(name, *shares, last) for name, shares in profile.items()]
+    x, y = "factor of the cheapest solver's expected evaluations", "share of problems and targets"
+    return [Chart(x=x, y=y, series=series, log=(True, False), range=SHARES)]
 
 
-def plot_performance_profile(comparisons: Sequence[Comparison]) -> Figure:
-    """Plot the performance profile of expected running times over problems and targets; solvers that ran on all."""
-    with use_style():
-        costs = list_expected_costs(comparisons)
-        figure, axes = make_axes(4.6, 2.8)
-        profile = compute_profiles(costs)
-        last = max([factor[-1] for factor, _ in profile.values() if factor.size], default=1.0) * 2.0
-        for name, look in assign_looks(profile).items():
-            _draw_share(axes, *profile[name], name, look, last)
-        use_log_axes(axes)
-        axes.set_xlim(1.0, last)
-        axes.set_xlabel("factor of the cheapest solver's expected evaluations")
-        axes.set_ylabel("share of problems and targets")
-        add_legend_below(figure)
-    return figure
+def list_expected_costs(comparisons: Sequence[Comparison]) -> dict[str, list[float]]:
+    """Return expected evaluations for each problem and target by solver.
+
+    Only solvers that ran on all problems with known evaluations.
+    """
+    by_name, shared = index_solvers(comparisons)
+    known = [name for name in shared if all(solvers[name].has_costs("evaluations") for solvers in by_name)]
+    return {name: [solvers[name].expected_cost(target) for solvers in by_name for target in TARGETS] for name in known}
 
 
 def plot_critical_difference(ranking: Ranking) -> Figure:
@@ -198,21 +186,3 @@ def plot_critical_difference(ranking: Ranking) -> Figure:
         axes.spines[["left", "right", "bottom"]].set_visible(False)
         axes.grid(visible=False)
     return figure
-
-
-def _draw_share(axes: Axes, at: Array, share: Array, name: str, look: Look, last: float) -> None:
-    """Draw a share that rises at some costs, up to a last cost."""
-    if at.size:
-        at, share = np.append(at, max(last, at[-1])), np.append(share, share[-1])
-    axes.step(at, share, where="post", color=look.colour, linestyle=look.line, label=name)
-    axes.set_ylim(0.0, 1.02)
-
-
-def list_expected_costs(comparisons: Sequence[Comparison]) -> dict[str, list[float]]:
-    """Return expected evaluations for each problem and target by solver.
-
-    Only solvers that ran on all problems with known evaluations.
-    """
-    found, shared = index_solvers(comparisons)
-    shared = [name for name in shared if all(solvers[name].has_costs("evaluations") for solvers in found)]
-    return {name: [solvers[name].expected_cost(target) for solvers in found for target in TARGETS] for name in shared}

@@ -142,19 +142,18 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     """Write ``<stem>.png`` and ``<stem>.svg`` and return both paths; raises OutputError."""
     import matplotlib
 
-    paths = stem.with_name(f"{stem.name}.png"), stem.with_name(f"{stem.name}.svg")
-    write_text(paths[1], render_svg(figure))
+    svg = write_text(stem.with_name(f"{stem.name}.svg"), render_svg(figure))
     with matplotlib.rc_context({"figure.constrained_layout.use": False}):
         figure.set_layout_engine(None)  # the layout is final; with any engine Matplotlib draws twice
-    with use_style(), replace_file(paths[0]) as file, delay_interrupts():
-        figure.savefig(file, format="png")
-    return paths
+    return save_figure(figure, stem.with_name(f"{stem.name}.png")), svg
 
 
-def save_pdf(figure: Figure, path: Path) -> Path:
-    """Write a figure as PDF in the current style and return the path; raises OutputError."""
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure as PNG or PDF in the current style and return the path; raises OutputError."""
+    kind = path.suffix.removeprefix(".")
+    metadata = {"CreationDate": None, "Creator": None, "Producer": None} if kind == "pdf" else None
     with use_style(), replace_file(path) as file, delay_interrupts():
-        figure.savefig(file, format="pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
+        figure.savefig(file, format=kind, metadata=metadata)
     return path
 
 
@@ -163,7 +162,7 @@ def render_svg(figure: Figure) -> str:
     text = io.StringIO()
     with delay_interrupts(), use_style():  # Matplotlib's compiled code turns Ctrl-C into other errors
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
-    return text.getvalue()
+    return re.sub(r"(\d\.\d\d)\d+", r"\1", text.getvalue())  # coordinates in points
 
 
 def inline_svg(svg: str, prefix: str, title: str) -> str:

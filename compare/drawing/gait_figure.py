@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.drawing.animation import COLOURS, GROUND, MARGIN
-from compare.drawing.figures import INK, Look, add_legend_below, assign_looks, make_figure, use_style
+from compare.drawing.charts import Chart, Series, add_legends, draw_chart
+from compare.drawing.figures import INK, Look, assign_looks, make_figure, use_style
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result, sample_signals
 from nlp_gait.formulation.display import TRUNK, Skeleton
@@ -25,7 +26,6 @@ SIDES = COLOURS | {TRUNK: INK}  # the page's ink, light or dark
 POSES = 6
 FAINTEST = 0.25  # opacity of the first pose; the last one has 1
 WIDTH_IN, ROW_IN = 7.4, 2.1
-CURVES = {"deviation": "deviation [mm]", "power": "mechanical power [W]", "margin": "balance margin [mm]"}
 
 
 @lock_casadi
@@ -46,7 +46,6 @@ class GaitCurves:
     t: Array  #: (T,) [s]
     power: Array | None  #: (T,) sum of the joints' |torque x rate| [W]; None for a problem without torques
     margin: Array | None  #: (T,) of ``Skeleton.margin``, in millimetres; None where no instant has one
-    deviation: Array | None = None  #: (T,) see ``measure_deviation``; None for the gait from which the others deviate
 
 
 @lock_casadi
@@ -71,21 +70,15 @@ def plot_gait(problem: GaitProblem, x: Array | Mapping[str, float], name: str) -
     return plot_gaits({name: prepare_gait(Result(problem=problem, x=problem.check_x(x)))})
 
 
-def plot_gaits(gaits: Mapping[str, GaitCurves]) -> Figure:
-    """Plot the first gait from the side, and curves of all by name, with their deviations from the first one.
+def plot_gaits(gaits: Mapping[str, GaitCurves], *, curves: bool = True) -> Figure:
+    """Plot the first gait from the side with the second one laid over it, and the curves of all.
 
     Raises:
         InputError: there is nothing to draw.
     """
-    name, first = next(iter(gaits.items()))
-    compared = {
-        each: replace(gait, deviation=measure_deviation(gait.skeleton, first.skeleton))
-        if each != name and gait.skeleton is not None and first.skeleton is not None
-        else gait
-        for each, gait in gaits.items()
-    }
-    curves = [c for c in CURVES if any(getattr(gait, c) is not None for gait in compared.values())]
-    count = (first.skeleton is not None) + len(curves)
+    charts = chart_gaits(gaits) if curves else []
+    (name, first), *others = gaits.items()
+    count = (first.skeleton is not None) + len(charts)
     if not count:
         raise InputError("these gaits have neither a skeleton nor torques: there is nothing to draw")
     columns = 2 if len(gaits) > 1 and count > 2 else count
@@ -95,14 +88,34 @@ def plot_gaits(gaits: Mapping[str, GaitCurves]) -> Figure:
         axes = list(figure.subplots(rows, columns, squeeze=False).flat)
         if first.skeleton is not None:
             _draw_poses(axes[0], first.skeleton, name)
-        look = assign_looks(list(gaits))
-        for axis, curve in zip(axes[count - len(curves) : count], curves, strict=True):
-            _draw_curves(axis, compared, look, curve)
+            if others and others[0][1].skeleton is not None:
+                _overlay_poses(axes[0], others[0][1].skeleton, assign_looks(list(gaits))[others[0][0]])
+                axes[0].set_title(f"{name}, and {others[0][0]} dashed", fontsize=8)
+        for axis, chart in zip(axes[count - len(charts) : count], charts, strict=True):
+            draw_chart(axis, chart)
         for empty in axes[count:]:
             empty.set_axis_off()
-        if len(gaits) > 1 and curves:
-            add_legend_below(figure, axes[count - 1])
+        add_legends(figure, axes[count - len(charts) : count], charts)
     return figure
+
+
+def chart_gaits(gaits: Mapping[str, GaitCurves]) -> list[Chart]:
+    """Return the deviation of each gait from the first one, the power and the balance margin over time."""
+    first, *others = gaits.values()
+    curves: dict[str, dict[str, Array | None]] = {
+        "deviation [mm]": {
+            name: measure_deviation(gait.skeleton, first.skeleton)
+            for name, gait in gaits.items()
+            if gait is not first and gait.skeleton is not None and first.skeleton is not None
+        },
+        "mechanical power [W]": {name: gait.power for name, gait in gaits.items()},
+        "balance margin [mm]": {name: gait.margin for name, gait in gaits.items()},
+    }
+    charts = []
+    for words, values in curves.items():
+        series = [Series(name=n, x=gaits[n].t, y=curve) for n, curve in values.items() if curve is not None]
+        charts += [Chart(x="time [s]", y=words, series=series)] if series else []
+    return charts
 
 
 def measure_deviation(gait: Skeleton, reference: Skeleton) -> Array:
@@ -134,10 +147,8 @@ def _draw_poses(axes: Axes, skeleton: Skeleton, name: str) -> None:
     axes.set_title(name, fontsize=8)
 
 
-def _draw_curves(axes: Axes, gaits: Mapping[str, GaitCurves], look: Mapping[str, Look], curve: str) -> None:
-    for name, gait in gaits.items():
-        values = getattr(gait, curve)
-        if values is not None:
-            axes.plot(gait.t, values, color=look[name].colour, linestyle=look[name].line, label=name)
-    axes.set_xlabel("time [s]")
-    axes.set_ylabel(CURVES[curve])
+def _overlay_poses(axes: Axes, skeleton: Skeleton, look: Look) -> None:
+    """Draw the first, middle and last pose, dashed in the colour of the solver."""
+    for k in (0, len(skeleton.t) // 2, -1):
+        for limb in skeleton.limbs:
+            axes.plot(*limb.points[k][:, (0, 2)].T, color=look.colour, linestyle="--", lw=0.8)

@@ -219,7 +219,7 @@ class Paper(Generic[E, R]):
         )
         cited = make_citation_section(record.definition["problem"] for record in runner.records)
         title = self.title if label == "full" else f"{self.title} ({label})"
-        write_document(folder, Document(title=title, verdict=[count_verdicts(found)], parts=(*parts, ending, cited)))
+        write_document(folder, Document(title=title, headline=[count_verdicts(found)], parts=(*parts, ending, cited)))
         return record
 
     def judge(self, results: Mapping[str, R], effort: E) -> dict[str, dict[str, Judgement]]:

@@ -115,7 +115,7 @@ class Capabilities(Question[tuple[Capability, ...]]):
         return Answer(
             stem=stem,
             title=f"What {robot.name if robot is not None else self.problem.name} can do",
-            verdict=(*(describe_capability(c) for c in findings), *describe_sharpest_turn(self.problem)),
+            headline=(*(describe_capability(c) for c in findings), *describe_sharpest_turn(self.problem)),
             parts=[
                 "Each value is the maximum of a walking cycle under all limits of the problem; limits are listed by what a "
                 "natural step of each would gain. Bounds on times, velocities, step and lift are ours: NAO's in proportion, "

@@ -200,7 +200,7 @@ class Certainty(Question[FoundCertainty]):
         return Answer(
             stem=stem,
             title=f"{problem.name}: certainty of the optimum",
-            verdict=(f"Proven: {findings.proven}.", f"Supported: {findings.supported}."),
+            headline=(f"Proven: {findings.proven}.", f"Supported: {findings.supported}."),
             parts=(
                 make_text_table((problem.objective.name, "starts", "share"), optima, listed),
                 make_text_table(("status", "starts"), statuses, "Status of the starts"),

@@ -306,7 +306,7 @@ class Prices(Question[FoundPrices]):
         return Answer(
             stem=stem,
             title=f"{problem.name}: what each limit costs",
-            verdict=(f"{objective.name} {with_unit(findings.objective, objective.unit)}, to {objective.sense}",),
+            headline=(f"{objective.name} {with_unit(findings.objective, objective.unit)}, to {objective.sense}",),
             parts=[*parts, make_record_table(stem, rows)],
             data={"problem": problem.name, **about, **asdict(findings)},
         )

@@ -94,7 +94,7 @@ class Question(ABC, Generic[F]):
         answer, known = self.report(findings), find_reference(identify_problem(self.problem))
         sentence = describe_value(known, self.get_optimum(findings), self.problem.objective, "the optimum found here")
         data = {**answer.data, **known.to_json()}
-        return replace(answer, verdict=(*answer.verdict, f"{sentence}."), data=data)
+        return replace(answer, headline=(*answer.headline, f"{sentence}."), data=data)
 
     def failures(self, findings: F) -> list[str]:
         """Return what failed, which ends the command with status 1."""

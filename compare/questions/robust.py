@@ -55,7 +55,7 @@ class Robust(Question[tuple[RobustGait, ...]]):
         return Answer(
             stem=stem,
             title=f"{name}: price of robustness",
-            verdict=(f"{nominal.nominal_W:.6f} W for the nominal robot; {_describe_box(widest.box)}",),
+            headline=(f"{nominal.nominal_W:.6f} W for the nominal robot; {_describe_box(widest.box)}",),
             parts=(
                 make_table("Price of robustness", findings, PRICES),
                 *(

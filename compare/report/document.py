@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -55,12 +55,17 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Figure:
-    """A drawing, the stem of its PNG and SVG files, and its caption."""
+    """A drawing, the stem of its SVG file, and its caption."""
 
     name: str
     caption: str
-    drawing: Drawing
-    data: Mapping[str, Any] | None = None  #: from which the page draws an interactive figure; see ``interactive``
+    drawing: Drawing | Callable[[], Drawing]  #: or the function that draws it
+    #: From which the page draws an interactive figure, if its scripts have an entry for ``kind``; else the drawing stays
+    data: Mapping[str, Any] | None = None
+
+    def draw(self) -> Drawing:
+        """Return the drawing."""
+        return self.drawing() if callable(self.drawing) else self.drawing
 
 
 @dataclass(frozen=True)
@@ -87,13 +92,13 @@ class Document:
     """A report."""
 
     title: str  #: of the page
-    verdict: Sequence[str] = ()  #: summary in at most three sentences; may be empty
+    headline: Sequence[str] = ()  #: the answer, before anything else
     parts: Sequence[Part]  #: the rest, in order
 
     @property
     def sections(self) -> list[Section]:
-        """Sections of the first level."""
-        return [part for part in self.parts if isinstance(part, Section)]
+        """Sections of the first level that are open."""
+        return [part for part in self.parts if isinstance(part, Section) and not part.folded]
 
 
 def make_text_table(

@@ -1,17 +1,15 @@
-"""Data that a page draws itself: runs for charts with hover, zoom and a choice of solvers; gaits in 3-D, also alone."""
+"""Gaits that a page draws itself in 3-D, in a report or alone."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.record_statistics import ECDF_TARGETS, Curve
-from compare.drawing.comparison_figures import SMALLEST_GAP
-from compare.drawing.figures import Look, assign_looks, render_svg
+from compare.drawing.charts import round_digits
+from compare.drawing.figures import assign_looks, render_svg
 from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
 from compare.report.document import Document, Figure
 from compare.report.writing import render_page
@@ -20,50 +18,23 @@ from nlp_gait.files import write_text
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.formulation.display import Skeleton
 
-MOST_FRAMES, MOST_SIMULATED = 61, 601  # of a gait; the page interpolates between them
-SIGNIFICANT_DIGITS = 5
+MOST_FRAMES, MOST_SIMULATED = 41, 601  # of a gait; the page interpolates between them
 CAPTION = "Left blue, right orange; the support polygon green, the zero-moment point pink, the centre of mass in ink."
 
 
-def describe_runs(comparison: Comparison) -> dict[str, Any]:
-    """Return the best so far of all runs of a problem: gaps are relative, costs are equivalent evaluations and seconds."""
-    looks = assign_looks([solver.name for solver in comparison.solvers])
-    return {
-        "kind": "convergence",
-        "smallest": SMALLEST_GAP,
-        "targets": _round(np.array(ECDF_TARGETS)),
-        "objective": f"{comparison.objective.name} [{comparison.objective.unit}]",
-        "solvers": [_describe_solver(comparison, solver, looks[solver.name]) for solver in comparison.solvers],
-    }
-
-
-def describe_gaits(gaits: Mapping[str, GaitCurves], most_frames: int = MOST_FRAMES) -> dict[str, Any] | None:
+def describe_gaits(
+    gaits: Mapping[str, GaitCurves], most_frames: int = MOST_FRAMES, *, curves: bool = True
+) -> dict[str, Any] | None:
     """Return the skeletons of gaits over time in millimetres and milliseconds, with power and margin; None without any."""
     looks = assign_looks(list(gaits))
     shown = [
-        _describe_gait(name, gait, looks[name].colour, most_frames)
+        _describe_gait(
+            name, gait if curves else replace(gait, power=None, margin=None), looks[name].colour, most_frames
+        )
         for name, gait in gaits.items()
         if gait.skeleton is not None
     ]
     return {"kind": "gaits", "gaits": shown} if shown else None
-
-
-def _describe_solver(comparison: Comparison, solver: SolverRuns, look: Look) -> dict[str, Any]:
-    runs = [
-        {"run": record.run, "value": _round(np.array([comparison.value(cost)]), 9)[0], **_describe_curve(curve)}
-        for record, cost, curve in zip(solver.records, solver.costs, solver.curves, strict=True)
-    ]
-    known = {axis: solver.has_costs(axis) for axis in ("evaluations", "seconds")}
-    return {"name": solver.name, "colour": look.colour, "line": look.line, "known": known, "runs": runs}
-
-
-def _describe_curve(curve: Curve) -> dict[str, Any]:
-    """Return the entries at which the best so far improves, and the last one."""
-    best = np.minimum.accumulate(curve.gap)
-    improves = np.append(best[:1] < np.inf, best[1:] < best[:-1])
-    improves[-1:] = True
-    kept = {"evaluations": curve.evaluations, "seconds": curve.seconds, "gap": best}
-    return {name: _round(values[improves]) for name, values in kept.items()}
 
 
 def _describe_gait(name: str, gait: GaitCurves, colour: str, most_frames: int) -> dict[str, Any]:
@@ -76,7 +47,7 @@ def _describe_gait(name: str, gait: GaitCurves, colour: str, most_frames: int) -
         "name": name,
         "colour": colour,
         "planar": skeleton.planar,
-        "t": _round(1000.0 * gait.t[frames]),
+        "t": round_digits(1000.0 * gait.t[frames]),
         "ground": _to_mm(skeleton.ground),
         "limbs": [{"side": limb.side, "points": _to_mm(limb.points[frames])} for limb in skeleton.limbs],
         "soles": [
@@ -84,7 +55,7 @@ def _describe_gait(name: str, gait: GaitCurves, colour: str, most_frames: int) -
             for s in skeleton.soles
         ],
         **{key: None if place is None else _to_mm(place[frames]) for key, place in points.items()},
-        **{key: None if curve is None else _round(curve[frames]) for key, curve in curves.items()},
+        **{key: None if curve is None else round_digits(curve[frames]) for key, curve in curves.items()},
     }
 
 
@@ -92,12 +63,6 @@ def _to_mm(metres: Array) -> list[Any]:
     """Return whole millimetres; a skeleton has no unknown coordinates."""
     rounded: list[Any] = np.round(1000.0 * metres).astype(int).tolist()
     return rounded
-
-
-def _round(values: Array, digits: int = SIGNIFICANT_DIGITS) -> list[float | int | None]:
-    """Round to significant digits; None for infinite and unknown values."""
-    rounded = [float(f"{value:.{digits}g}") if np.isfinite(value) else None for value in values]
-    return [int(value) if value is not None and value.is_integer() else value for value in rounded]
 
 
 @dataclass(frozen=True)

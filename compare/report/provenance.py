@@ -20,14 +20,24 @@ from nlp_gait.backends.identity import hash_json, make_key
 from nlp_gait.backends.solvers.registry import make_solver
 from nlp_gait.errors import GaitError
 
-# The one explanation of each term, on every page that uses it.
-TERMS = Prose(
-    "*Terms.* **Run**: one solver with one seed; a start of a gradient method is a run. **Gap**: distance from the best "
-    "known value, relative to it. **Reached to 1e-6**: a gap of at most 1e-6, which is 0.0001 %. **Evaluations** are "
-    "equivalent ones: the objective with all constraints at one point counts 1; for n variables a gradient or a Jacobian "
-    "counts n + 1, a Hessian (n + 1)(n + 2)/2, like finite differences. **Constraint**: one value between a lower and an "
-    "upper bound; the bounds of the variables are not counted."
-)
+# The one explanation of each term: of a column by its heading, and in the glossary at the end of a page.
+GLOSSARY = {
+    "run": "one solver with one seed; a start of a gradient method is a run",
+    "gap": "distance from the best known value, relative to it",
+    "reached": "a gap of at most 1e-6, which is 0.0001 %",
+    "feasible": "satisfies all constraints at the problem's samples, within the judge's tolerance",
+    "guaranteed": "proven to satisfy all limits at every instant",
+    "evaluations": "equivalent ones: the objective with all constraints at one point counts 1; for n variables a gradient or "
+    "a Jacobian counts n + 1, a Hessian (n + 1)(n + 2)/2, like finite differences",
+    "constraint": "one value between a lower and an upper bound; the bounds of the variables are not counted",
+    "price": "change of the optimal objective per unit by which a bound is raised",
+}
+TERMS = Prose("*Terms.* " + ". ".join(f"**{term.capitalize()}**: {words}" for term, words in GLOSSARY.items()) + ".")
+
+
+def explain(heading: str) -> str:
+    """Return the glossary's words for the term that a heading contains; empty for none."""
+    return next((words for term, words in GLOSSARY.items() if term in heading.split()), "")
 
 
 def make_solver_table(records: Iterable[RunRecord]) -> Table:

@@ -4,14 +4,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import mean, stdev
+from statistics import mean, median, stdev
 
 from compare.analysis.comparison import Comparison
+from compare.analysis.pairs import SIGNIFICANT
 from compare.analysis.record_statistics import TARGETS
-from compare.analysis.solver_table import summarise
 from compare.analysis.units import join_words, make_heading, with_unit
-from compare.analysis.verdict import SIGNIFICANT, compare_pairs, find_leaders
-from compare.drawing.figures import save_pdf, use_paper_style
+from compare.drawing.charts import plot_charts
+from compare.drawing.figures import save_figure, use_paper_style
+from compare.report.document import Document, Figure, iterate_leaves
 from compare.report.problem_section import FIGURES
 from compare.study.record import HEADER, JUDGED, make_judged_cells, make_row
 from nlp_gait.files import format_csv, make_file_name, replace_nan, write_text
@@ -29,20 +30,24 @@ class FurtherFiles:
 
     csv: bool = False  #: all runs, and the points of each problem; written again, too, where they exist already
     latex: bool = False  #: a table of each problem
-    pdf: bool = False  #: figures of each problem one column wide, and their captions in LaTeX
+    #: figures of the report as PNG, and those of each problem one column wide as PDF with their captions in LaTeX
+    figures: bool = False
 
-    def write(self, folder: Path, comparisons: Sequence[Comparison]) -> list[Path]:
+    def write(self, folder: Path, comparisons: Sequence[Comparison], document: Document) -> list[Path]:
         """Write the files and return their paths; raises OutputError."""
         written = []
         if self.csv or (folder / "runs.csv").exists():
             tables = {"runs": make_runs_table(comparisons), **_make_point_tables(comparisons)}
             for name, rows in tables.items():
                 written.append(write_text(folder / f"{name}.csv", format_csv(replace_nan(rows))))
+        if self.figures:
+            drawn = [part for part in iterate_leaves(document.parts) if isinstance(part, Figure)]
+            written += [save_figure(figure.draw(), folder / f"{figure.name}.png") for figure in drawn]
         for comparison in comparisons:
             stem = folder / make_file_name(comparison.problem)
             if self.latex:
                 written.append(write_text(stem.with_name(f"{stem.name}-table.tex"), format_latex_table(comparison)))
-            if self.pdf:
+            if self.figures:
                 written += _write_figures(stem, comparison)
         return written
 
@@ -84,13 +89,14 @@ def _write_figures(stem: Path, comparison: Comparison) -> list[Path]:
     """Write ``<problem>-<figure>.pdf`` for each figure, and ``<problem>-figures.tex`` with their captions."""
     written, text = [], ""
     with use_paper_style():
-        for name, (plot, _, words) in FIGURES.items():
+        for name, (compute, caption) in FIGURES.items():
             figure = f"{stem.name}-{name}"
-            written.append(save_pdf(plot(comparison, column=True), stem.with_name(f"{figure}.pdf")))
-            caption = escape_latex(f"{words}; {comparison.problem}, {describe_run_counts(comparison)}.")
+            drawing = plot_charts(compute(comparison), column=True)
+            written.append(save_figure(drawing, stem.with_name(f"{figure}.pdf")))
+            words = f"{caption.removesuffix('.')}; {comparison.problem}, {describe_run_counts(comparison)}."
             text += (
                 f"\\begin{{figure}}\n\\centering\n\\includegraphics{{{figure}.pdf}}\n"
-                f"\\caption{{{caption}}}\n\\label{{fig:{figure}}}\n\\end{{figure}}\n"
+                f"\\caption{{{escape_latex(words)}}}\n\\label{{fig:{figure}}}\n\\end{{figure}}\n"
             )
     return [*written, write_text(stem.with_name(f"{stem.name}-figures.tex"), text)]
 
@@ -104,20 +110,18 @@ UNKNOWN = "--"
 
 def format_latex_table(comparison: Comparison) -> str:
     """Return the table of one problem: a row for each solver, the best median over all runs first."""
-    leader = comparison.solvers[0].name
-    p_values = {pair.second: pair.rank_sum for pair in compare_pairs(comparison) if pair.first == leader}
-    best = find_leaders(comparison)
+    p_values = {pair.second: pair.rank_sum for pair in comparison.pairs if pair.first == comparison.solvers[0].name}
     lines = [" & ".join(LATEX_HEADER) + r" \\"]
-    for solver, summary in zip(comparison.solvers, summarise(comparison), strict=True):
-        values = [comparison.value(cost) for cost in solver.feasible]
+    for solver in comparison.solvers:
+        values = sorted((comparison.value(cost) for cost in solver.feasible), reverse=comparison.objective.sign < 0)
         deviation = stdev(values) if len(values) > 1 else None
-        numbers = (summary.best, summary.median, mean(values) if values else None, deviation, summary.worst)
+        numbers = (values[0], median(values), mean(values), deviation, values[-1]) if values else 5 * (None,)
         cells = [_format_number(number) for number in numbers]
-        if solver.name in best and values:
+        if solver.name in comparison.leaders and values:
             cells[1] = rf"\textbf{{{cells[1]}}}"
-        p, gap = p_values.get(solver.name), escape_latex(comparison.format_gap(summary.gap))
+        p, gap = p_values.get(solver.name), escape_latex(comparison.format_gap(comparison.gap(solver.median_cost)))
         shown_p = UNKNOWN if p is None else "$<$0.001" if p < 0.001 else f"{p:.3f}"
-        row = (escape_latex(solver.name), f"{summary.feasible}/{summary.runs}", *cells, gap, shown_p)
+        row = (escape_latex(solver.name), f"{len(values)}/{len(solver.records)}", *cells, gap, shown_p)
         lines.append(" & ".join(row) + r" \\")
     return "\n".join(
         [
@@ -162,7 +166,7 @@ def _write_caption(comparison: Comparison) -> str:
     sentences = [
         f"{make_heading(objective.name, objective.unit)} on {comparison.problem}, to be {objective.sense}d: "
         f"{describe_run_counts(comparison)}",
-        "Best to gap are over the feasible runs",
+        "Best to worst are over the feasible runs",
         gap,
         "p: two-sided rank-sum test over all runs against the first solver, Holm-corrected over all pairs",
         f"Bold: the first solver and those that do not differ from it at {SIGNIFICANT:g}",

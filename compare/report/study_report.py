@@ -4,24 +4,32 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from compare.analysis.better_points import write_better_points
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems, label_editions
-from compare.analysis.overview import rank_over_problems, write_overall_verdict
+from compare.analysis.headline import MANY, write_headlines
 from compare.analysis.record_statistics import Weighting
 from compare.analysis.simulated_gaits import select_best_gaits
-from compare.analysis.verdict import write_verdict
-from compare.report.document import Document, Section, make_table_section, make_text_table
-from compare.report.problem_section import HOW, make_problem_section
-from compare.report.provenance import TERMS, format_settings, make_solver_table
-from compare.report.solver_sections import make_overview
+from compare.judge import evaluate
+from compare.report.document import Document, Section, make_table_section
+from compare.report.problem_section import load_gaits, make_problem_section
 from compare.report.study_files import FurtherFiles
-from compare.report.writing import make_citation_section, make_session_section, write_document
+from compare.report.study_sections import (
+    HOW,
+    TESTS,
+    list_convergence,
+    list_costs,
+    list_optimum,
+    list_tests,
+    make_folded_section,
+    make_overview,
+    make_settings_section,
+)
+from compare.report.writing import write_document
 from compare.study.evidence import Exclusion, read_evidence
-from compare.study.record import RunRecord
+from compare.study.record import RunRecord, load_gait
 from compare.study.record_files import RECORDS
 from compare.study.settings import Manifest, read_manifest
 from compare.study.simulations import SimulatedGait, load_simulations
-from nlp_gait.files import write_text
+from nlp_gait.files import make_file_name, replace_nan, write_json, write_text
 
 REPORT_ALONE = FurtherFiles()
 RELOAD = '<head>\n<meta http-equiv="refresh" content="5">'  # seconds between reloads of the page
@@ -46,12 +54,12 @@ def write_report(
     excluded: Sequence[Exclusion] = (),
     further: FurtherFiles = REPORT_ALONE,
 ) -> list[Path]:
-    """Write the report with stored simulations, the figures as PNG and SVG, and further files; return all paths."""
+    """Write the report with stored simulations, its figures as SVG, and further files; return all paths."""
     comparisons = compare_problems(records, weighting)
     simulated = load_simulations(folder, select_best_gaits(comparisons))
     document = make_study_document(comparisons, manifest, simulated, excluded)
     written = write_document(folder, document)
-    return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons)]
+    return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons, document)]
 
 
 def watch_report(folder: Path, rewrite: Callable[[], object], sleep: Callable[[float], None] = time.sleep) -> None:
@@ -79,20 +87,24 @@ def make_study_document(
     excluded: Sequence[Exclusion] = (),
 ) -> Document:
     """Return the document of a study, of its best gaits simulated in the engine, and of excluded records."""
-    sections = [make_problem_section(c, [gait for gait in simulated if gait.problem == c.problem]) for c in comparisons]
-    sessions = [make_session_section(number, session) for number, session in enumerate(manifest.sessions, start=1)]
-    ranking = rank_over_problems(comparisons) if len(comparisons) > 1 else None
+    gaits = {comparison.problem: load_gaits(comparison) for comparison in comparisons}
     return Document(
-        title="Comparison of solvers on " + ", ".join(c.problem for c in comparisons),
-        verdict=write_overall_verdict(comparisons, ranking) if ranking else write_verdict(comparisons),
+        title="Solvers on " + ", ".join(c.problem for c in comparisons),
+        headline=write_headlines(comparisons),
         parts=(
             *_list_excluded(excluded),
-            TERMS,
-            *((make_overview(comparisons, ranking),) if ranking else ()),
-            *sections,
-            *(() if simulated else (HOW,)),
-            Section(title="Methods", parts=(*_describe_counting(comparisons), _list_settings(comparisons), *sessions)),
-            make_citation_section(c.records[0].definition["problem"] for c in comparisons),
+            *(make_problem_section(c, gaits[c.problem]) for c in comparisons),
+            *((make_overview(comparisons),) if len(comparisons) >= MANY else ()),
+            make_folded_section("Convergence", comparisons, list_convergence),
+            make_folded_section("Cost to targets", comparisons, list_costs),
+            make_folded_section("Significance", comparisons, list_tests, TESTS),
+            make_folded_section(
+                "Optimum: active constraints, prices, gaits",
+                comparisons,
+                lambda c: list_optimum(c, gaits[c.problem], simulated),
+                *(() if simulated else (HOW,)),
+            ),
+            make_settings_section(comparisons, manifest.sessions),
         ),
     )
 
@@ -105,32 +117,22 @@ def _list_excluded(excluded: Sequence[Exclusion]) -> tuple[Section, ...]:
     return make_table_section("Excluded records", ("record", "reason"), rows, words, prose=True)
 
 
-def _describe_counting(comparisons: Sequence[Comparison]) -> tuple[Section, ...]:
-    sizes = [max((len(r.x) for r in c.records), default=0) for c in comparisons]
-    rows = [
-        (c.problem, *(f"{w:g}" for w in c.weighting.of_kind(n).values()))
-        for c, n in zip(comparisons, sizes, strict=True)
-    ]
-    return make_table_section(
-        "Counting",
-        ("weight of a call", "f", "g", "gradient", "Jacobian", "Hessian"),
-        rows,
-        "Objective and constraints count separately where they are called separately, so gradient methods are never favoured. A "
-        "gradient run reaches its targets at its end. A polished run includes the cost of its search. Times are wall times of "
-        "the solve, without building or compiling.",
-        "Searches with equal seeds start from the same points; run k has the study's seed plus k. The table of settings says "
-        "what was changed; the defaults are those of the sources, and none was tuned on these problems.",
-    )
+def write_better_points(folder: Path, comparisons: Sequence[Comparison]) -> list[Path]:
+    """Judge every run that is better than the best known value again, write it as a result, and return the files.
 
-
-def _list_settings(comparisons: Sequence[Comparison]) -> Section:
-    problems = {c.problem: c.records[0].definition["problem"] for c in comparisons}
-    rows = [
-        (name, format_settings(problem["parameters"]) or "none", format_settings(problem["options"]))
-        for name, problem in problems.items()
-    ]
-    solvers = make_solver_table(record for comparison in comparisons for record in comparison.records)
-    return Section(
-        title="Settings and seeds",
-        parts=(solvers, make_text_table(("problem", "changed values", "options"), rows, prose=True)),
-    )
+    A file ``better-<problem>.json`` can be read by every command that reads the result of ``solve --out``.
+    """
+    written = []
+    for comparison in comparisons:
+        run = comparison.better
+        if run is None:
+            continue
+        gait = load_gait(run)
+        evaluation = evaluate(gait.problem, gait.x)
+        if evaluation.feasible and comparison.known.is_beaten_by(evaluation.objective["value"], comparison.objective):
+            known = {"objective": comparison.reference, "source": comparison.known.source}
+            origin = {"solver": run.solver, "run": run.run, "seed": run.seed, "settings": run.settings}
+            path = folder / f"better-{make_file_name(comparison.problem)}.json"
+            write_json(path, replace_nan({**evaluation.to_json(), "found_by": origin, "best_known_before": known}))
+            written.append(path)
+    return written

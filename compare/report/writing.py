@@ -11,8 +11,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
-from compare.drawing.figures import inline_svg, save
+from compare.drawing.figures import inline_svg, render_svg
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, iterate_leaves, make_text_table
+from compare.report.provenance import explain
 from compare.study.citations import cite_problems
 from compare.study.settings import Session
 from nlp_gait.files import format_csv, write_text
@@ -32,14 +33,13 @@ def write_document(folder: Path, document: Document, page: str = "report") -> li
 
 
 def write_parts(folder: Path, parts: Sequence[Part]) -> list[Path]:
-    """Write each table that has a name as ``<name>.csv`` and each figure as ``<name>.png`` and ``.svg``; returns the paths."""
+    """Write each table that has a name as ``<name>.csv`` and each figure as ``<name>.svg``; returns the paths."""
     files: list[Path] = []
     for part in iterate_leaves(parts):
         if isinstance(part, Figure):
-            files += save(part.drawing, folder / part.name)
+            files.append(write_text(folder / f"{part.name}.svg", render_svg(part.draw())))
         elif isinstance(part, Table) and part.name:
-            files.append(folder / f"{part.name}.csv")
-            write_text(files[-1], format_csv(part.csv_rows))
+            files.append(write_text(folder / f"{part.name}.csv", format_csv(part.csv_rows)))
     return files
 
 
@@ -54,7 +54,7 @@ def render_page(document: Document, drawings: Sequence[str]) -> str:
 
 
 def render_markdown(document: Document) -> str:
-    """Return Markdown that shows the figures' PNG files."""
+    """Return Markdown that shows the figures' SVG files."""
     text = _load_templates(page=False).get_template("report.md.j2").render(document=document)
     return re.sub(r"\n{3,}", "\n\n", text).strip() + "\n"
 
@@ -69,7 +69,8 @@ def _load_templates(*, page: bool) -> Environment:
         trim_blocks=not page,
         lstrip_blocks=not page,
     )
-    environment.filters |= {"kind": _name_kind, "html": _render_html, "anchor": _make_anchor, "md": _escape_markdown}
+    filters = {"kind": _name_kind, "html": _render_html, "anchor": _make_anchor, "md": _escape_markdown}
+    environment.filters |= filters | {"explain": explain}
     return environment
 
 

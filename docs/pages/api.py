@@ -38,7 +38,7 @@ DOORS = {
     "compare.questions.pareto.front": ("FrontPoint", "solve_front"),
     "compare.study.import_runs": ("import_runs",),
     "compare.analysis.comparison": ("Comparison", "SolverRuns", "compare_problems"),
-    "compare.analysis.solver_table": ("SolverSummary", "format_cells", "summarise", "HEADER"),
+    "compare.analysis.columns": ("Column", "format_rows", "summarise"),
     "compare.report": (),
     "compare.report.document": ("Cell", "Document", "Figure", "Prose", "Section", "Table", "make_text_table"),
     "compare.report.writing": ("render_markdown", "write_document"),

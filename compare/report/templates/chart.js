@@ -24,13 +24,13 @@ class Chart {
   constructor(parent, { label, x, y, log = [false, false], height = 280, range = null }) {
     Object.assign(this, { x, y, log, height, range, names: null, series: [], view: null, cursor: null, chosen: null });
     this.box = element("div", { class: "chart" }, parent);
-    const buttons = element("div", { class: "zoom" }, this.box);
-    for (const [sign, words, act] of [
-      ["+", "Zoom in", () => this.zoom(0.5)], ["\u2212", "Zoom out", () => this.zoom(2)], ["\u21ba", "Show all", () => this.reset()],
-    ]) element("button", { type: "button", "aria-label": `${words}: ${label}`, title: words }, buttons, sign).addEventListener("click", act);
     this.svg = element("svg:svg", { tabindex: "0", role: "group", "aria-roledescription": "chart",
       "aria-label": `${label}. Arrow keys read values, plus and minus zoom, 0 shows all.` }, this.box);
-    this.note = element("output", { class: "note", "aria-live": "polite" }, this.box);
+    const below = element("div", { class: "below" }, this.box);
+    this.note = element("output", { class: "note", "aria-live": "polite" }, below);
+    for (const [sign, words, act] of [
+      ["+", "Zoom in", () => this.zoom(0.5)], ["\u2212", "Zoom out", () => this.zoom(2)], ["\u21ba", "Show all", () => this.reset()],
+    ]) element("button", { type: "button", "aria-label": `${words}: ${label}`, title: words }, below, sign).addEventListener("click", act);
     this.svg.addEventListener("pointermove", (event) => this.point(event));
     this.svg.addEventListener("pointerleave", () => { if (!this.drag) this.choose(null); });
     this.svg.addEventListener("pointerdown", (event) => { this.drag = this.place(event); });
@@ -68,7 +68,7 @@ class Chart {
   draw() {
     const width = this.box.clientWidth;
     if (!width) return;
-    const frame = { left: this.names ? 24 + 7 * Math.max(3, ...this.names.map(([, name]) => Math.min(name.length, 16))) : 56, right: width - 8, top: 8, bottom: this.height - 40 };
+    const frame = { left: this.names ? 24 + 7 * Math.max(3, ...this.names.map(([, name]) => Math.min(name.length, 24))) : 56, right: width - 8, top: 8, bottom: this.height - 40 };
     const ends = this.view || this.extent();
     this.ends = ends;
     this.frame = frame;
@@ -84,6 +84,10 @@ class Chart {
     const size = { x: frame.left, y: frame.top, width: Math.max(0, frame.right - frame.left), height: frame.bottom - frame.top };
     element("svg:rect", size, area);
     this.drawAxes(width, across, up);
+    if (this.mark_x) {
+      const [x] = this.pixel([this.mark_x, 1]);
+      element("svg:line", { x1: x, x2: x, y1: frame.top, y2: frame.bottom, class: "limit" }, this.svg);
+    }
     const inside = element("svg:g", { "clip-path": `url(#${clip})` }, this.svg);
     for (const one of this.series) this.drawSeries(one, inside);
     this.over = element("svg:g", { "pointer-events": "none" }, this.svg);

@@ -36,6 +36,7 @@ class GaitView {
     Object.assign(this, { gaits: data.gaits, time: 0, playing: !matchMedia("(prefers-reduced-motion: reduce)").matches,
       yaw: data.gaits[0].planar ? 0 : -0.6, pitch: data.gaits[0].planar ? 0 : 0.25, speed: 0.25, visible: true });
     const parent = figure.interactive;
+    this.charts = data.gaits.some((gait) => gait.power || gait.margin) && {};
     this.addControls(element("div", { class: "controls gait" }, parent));
     this.canvas = element("canvas", { tabindex: "0", role: "img",
       "aria-label": "Gait in 3-D. Drag or use arrow keys to turn it, the space bar plays and pauses." }, parent);
@@ -46,10 +47,11 @@ class GaitView {
     });
     for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, () => { this.grip = null; });
     this.canvas.addEventListener("keydown", (event) => this.press(event));
-    const curves = element("div", { class: "curves" }, parent);
-    this.charts = { power: "mechanical power [W]", margin: "balance margin [mm]" };
-    for (const [key, y] of Object.entries(this.charts))
-      this.charts[key] = this.gaits.some((gait) => gait[key]) ? new Chart(curves, { label: y, x: "time [s]", y, height: 200 }) : null;
+    if (this.charts) {
+      const curves = element("div", { class: "curves" }, parent);
+      for (const [key, y] of [["power", "mechanical power [W]"], ["margin", "balance margin [mm]"]])
+        if (this.gaits.some((gait) => gait[key])) this.charts[key] = new Chart(curves, { label: y, x: "time [s]", y, height: 200 });
+    }
     new IntersectionObserver((entries) => { this.visible = entries.at(-1).isIntersecting; }).observe(this.canvas); // the last is the latest
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.select();
@@ -72,9 +74,9 @@ class GaitView {
     };
     const names = this.gaits.map((gait, i) => [i, gait.name]);
     const again = () => this.select();
-    this.first = select("gait", names, "0", again);
+    this.first = this.charts ? select("gait", names, "0", again) : { value: "0" };
     this.second = select("over it", [["", "none"], ...names], names.length > 1 ? "1" : "", again);
-    select("speed", [[1, "1"], [0.5, "1/2"], [0.25, "1/4"], [0.1, "1/10"]], "0.25", (value) => { this.speed = Number(value); });
+    if (this.charts) select("speed", [[1, "1"], [0.5, "1/2"], [0.25, "1/4"], [0.1, "1/10"]], "0.25", (value) => { this.speed = Number(value); });
     this.play(this.playing);
   }
 
@@ -102,8 +104,8 @@ class GaitView {
     this.duration = Math.max(...this.shown.map((gait) => gait.t[gait.t.length - 1]));
     const all = this.shown.flatMap((gait) => [...gait.limbs, ...gait.soles].flatMap((part) => part.points.flat()));
     this.box = [0, 1, 2].map((i) => [all.reduce((m, p) => Math.min(m, p[i]), Infinity), all.reduce((m, p) => Math.max(m, p[i]), -Infinity)]);
-    for (const [key, chart] of Object.entries(this.charts))
-      if (chart) chart.show(this.shown.filter((gait) => gait[key]).map((gait) => ({ name: gait.name, colour: gait.colour, line: "-", shape: "line",
+    for (const [key, chart] of Object.entries(this.charts || {}))
+      chart.show(this.shown.filter((gait) => gait[key]).map((gait) => ({ name: gait.name, colour: gait.colour, line: "-", shape: "line",
         points: gait.t.map((t, i) => [t / 1000, gait[key][i], `${gait.name}: ${formatNumber(gait[key][i])} at ${formatNumber(t / 1000)} s`])
           .filter(([, value]) => Number.isFinite(value)) })));
     this.draw();
@@ -126,7 +128,7 @@ class GaitView {
     const time = Math.min(this.time, this.duration);
     this.slider.value = String(Math.round((1000 * time) / this.duration));
     this.clock.value = `${(time / 1000).toFixed(2)} s`;
-    for (const chart of Object.values(this.charts)) if (chart) { chart.cursor = time / 1000; chart.mark(); }
+    for (const chart of Object.values(this.charts || {})) { chart.cursor = time / 1000; chart.mark(); }
     canvas.width = width * ratio;
     canvas.height = height * ratio;
     const pen = canvas.getContext("2d");

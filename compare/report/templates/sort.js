@@ -15,7 +15,7 @@ for (const table of document.querySelectorAll("table")) {
   table.classList.add("sortable");
   for (const row of body.rows) [...row.cells].forEach((cell, column) => { cell.dataset.label = heads[column].textContent; });
   heads.forEach((head, column) => {
-    head.title = `Sort by ${head.textContent}`;
+    head.title ||= `Sort by ${head.textContent}`;
     head.addEventListener("click", () => {
       const upwards = head.getAttribute("aria-sort") !== "ascending";
       heads.forEach((other) => other.removeAttribute("aria-sort"));

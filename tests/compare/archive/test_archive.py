@@ -160,7 +160,7 @@ def test_the_commands_and_a_forged_report(folder: Path, tmp_path: Path, undrawn_
     assert good.exit_code == 0 and json.loads(good.stdout)["holds"], good.output
     with zipfile.ZipFile(tmp_path / "study.zip") as archive:
         content = {name: archive.read(name) for name in archive.namelist()}
-    content["report.md"] = content["report.md"].replace(b"Best known: on walk f 0.9", b"Best known: on walk f 1.9", 1)
+    content["report.md"] = content["report.md"].replace(b"On walk the best f is 0.9", b"On walk the best f is 1.9", 1)
     (tmp_path / "forged.zip").write_bytes(write_zip(sign(content)))
     bad = call(app, ["verify", str(tmp_path / "forged.zip")])
     assert bad.exit_code == 1 and "report.md: DOES NOT HOLD: line" in bad.stdout, bad.output

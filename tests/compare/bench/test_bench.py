@@ -113,7 +113,7 @@ def test_the_page_says_it(tmp_path: Path) -> None:
     twin = [replace(r, solver="twin") for id in ids for r in load_baseline(id) if r.solver == "pso"]
     board = rank_solvers(ids, twin)
     written = write_document(tmp_path, make_leaderboard_page(board, "twin", "two instances"), "leaderboard")
-    assert {path.name for path in written} >= {"leaderboard.html", "leaderboard.md", "gaitbench-runtime.png"}
+    assert {path.name for path in written} >= {"leaderboard.html", "leaderboard.md", "gaitbench-runtime.svg"}
     text = (tmp_path / "leaderboard.md").read_text(encoding="utf-8")
     assert f"twin takes place {board.place('twin')} of 13" in text
     for id in ids:

@@ -67,7 +67,7 @@ def test_bench_ranks_a_user_algorithm(mine: Path, tmp_path: Path, name: str) -> 
     found = as_json(*call)
     assert 1 <= found["rank"] <= 13 and found["instances"] == [ID]
     assert {s["solver"] for s in found["standings"]} == {*BASELINE, found["solver"]}
-    assert (out / "leaderboard.html").is_file() and (out / "gaitbench-runtime.png").is_file()
+    assert (out / "leaderboard.html").is_file() and (out / "gaitbench-runtime.svg").is_file()
     records = list((out / "records").glob("*/*.json"))
     assert len(records) == 3
     times = [path.stat().st_mtime_ns for path in records]

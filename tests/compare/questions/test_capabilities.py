@@ -78,8 +78,8 @@ def test_the_answer_says_what_stops_it_and_whose_bounds_these_are(
     question: Capabilities, found: tuple[Capability, ...]
 ) -> None:
     answer = question.report(found)
-    assert answer.verdict[0].startswith("highest speed: 0.2 m/s, stopped by bounds[")
-    assert "; bounds of ours among them. With wider ones (" in answer.verdict[0]
+    assert answer.headline[0].startswith("highest speed: 0.2 m/s, stopped by bounds[")
+    assert "; bounds of ours among them. With wider ones (" in answer.headline[0]
 
 
 def test_a_problem_without_steps_is_refused() -> None:

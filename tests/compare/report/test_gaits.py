@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from compare.analysis.comparison import Comparison, compare_problems
-from compare.drawing.gait_figure import CURVES, measure_deviation
-from compare.report.document import Figure
-from compare.report.problem_section import make_gaits_part
+from compare.drawing.gait_figure import chart_gaits, measure_deviation, plot_gaits
+from compare.report.problem_section import load_gaits
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import Limb, Skeleton
 from tests.compare.records import DSP_X, record, study
@@ -23,15 +22,14 @@ def comparison(name: str, x: dict[str, float], *solvers: str) -> Comparison:
     return compare_problems(changed)[0]
 
 
-@pytest.mark.slow
 def test_the_best_gait_is_drawn_and_the_others_as_deviations_from_it() -> None:
-    part = make_gaits_part(comparison("nao-dsp", DSP_X, "pso", "ga"))
-    assert isinstance(part, Figure) and part.name == "dsp-gaits"
-    axes = part.drawing.axes
-    assert sum(axis.get_title() != "" for axis in axes) == 1
-    curves = {axis.get_ylabel(): axis.lines for axis in axes if axis.get_ylabel() in CURVES.values()}
-    assert [len(lines) for lines in curves.values()] == [1, 2, 2]
-    assert abs(curves[CURVES["deviation"]][0].get_ydata()).max() < 1e-9  # both have the same gait
+    gaits = load_gaits(comparison("nao-dsp", DSP_X, "pso", "ga"))
+    assert not isinstance(gaits, str)
+    deviation, power, margin = charts = chart_gaits(gaits)
+    assert [len(chart.series) for chart in charts] == [1, 2, 2]
+    assert [chart.y for chart in charts] == ["deviation [mm]", "mechanical power [W]", "balance margin [mm]"]
+    assert abs(deviation.series[0].y).max() < 1e-9  # both have the same gait
+    assert [axis.get_title() for axis in plot_gaits(gaits, curves=False).axes] == ["ga, and pso dashed"]
 
 
 def test_a_gait_shifted_by_a_millimetre_deviates_by_a_millimetre_at_any_speed() -> None:
@@ -54,9 +52,9 @@ def test_a_gait_shifted_by_a_millimetre_deviates_by_a_millimetre_at_any_speed() 
 )
 def test_what_cannot_be_drawn_is_reported(name: str, x: dict[str, float], why: str) -> None:
     """Code that a record names is not run for it."""
-    part = make_gaits_part(comparison(name, x, "pso"))
+    part = load_gaits(comparison(name, x, "pso"))
     assert isinstance(part, str) and part.startswith("The gaits are not drawn: ") and why in part
 
 
 def test_an_unknown_problem_does_not_fail_the_report() -> None:
-    assert "unknown problem 'walk'" in str(make_gaits_part(compare_problems(study())[0]))
+    assert "unknown problem 'walk'" in str(load_gaits(compare_problems(study())[0]))

@@ -13,10 +13,13 @@ import pytest
 
 from compare.analysis.comparison import compare_problems
 from compare.report import FurtherFiles
+from compare.report.document import Document
 from compare.report.study_files import format_latex_table
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
+
+EMPTY = Document(title="", parts=())
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +50,7 @@ def test_the_numbers_are_those_of_the_runs(records: list[RunRecord]) -> None:
 
 def test_csv_has_the_gap_dimension_budget_and_costs_to_targets(records: list[RunRecord], tmp_path: Path) -> None:
     comparisons = compare_problems(records)
-    further = FurtherFiles(csv=True)
-    further.write(tmp_path, comparisons)
+    FurtherFiles(csv=True).write(tmp_path, comparisons, EMPTY)
     with open(tmp_path / "runs.csv") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(records) and {(row["n"], row["budget"]) for row in rows} == {("4", "1000")}
@@ -61,15 +63,15 @@ def test_csv_has_the_gap_dimension_budget_and_costs_to_targets(records: list[Run
 
 def test_runs_csv_is_written_again_where_it_exists(records: list[RunRecord], tmp_path: Path) -> None:
     nothing = FurtherFiles()
-    assert nothing.write(tmp_path, compare_problems(records)) == []
+    assert nothing.write(tmp_path, compare_problems(records), EMPTY) == []
     (tmp_path / "runs.csv").write_text("old\n")
-    assert tmp_path / "runs.csv" in nothing.write(tmp_path, compare_problems(records))
+    assert tmp_path / "runs.csv" in nothing.write(tmp_path, compare_problems(records), EMPTY)
     assert (tmp_path / "runs.csv").read_text().startswith("problem,solver,run,")
 
 
 @pytest.mark.slow
 def test_figures_are_one_column_wide_with_embedded_fonts(records: list[RunRecord], tmp_path: Path) -> None:
-    *figures, captions = FurtherFiles(pdf=True).write(tmp_path, compare_problems(records))
+    *figures, captions = FurtherFiles(figures=True).write(tmp_path, compare_problems(records), EMPTY)
     for figure in figures:
         content = figure.read_bytes()
         box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+) ", content)
@@ -81,7 +83,7 @@ def test_figures_are_one_column_wide_with_embedded_fonts(records: list[RunRecord
 def test_latex_reads_it(records: list[RunRecord], tmp_path: Path) -> None:
     if shutil.which("pdflatex") is None:
         pytest.skip("pdflatex is not installed")
-    FurtherFiles(latex=True, pdf=True).write(tmp_path, compare_problems(records))
+    FurtherFiles(latex=True, figures=True).write(tmp_path, compare_problems(records), EMPTY)
     (tmp_path / "page.tex").write_text(
         "\\documentclass{article}\n\\usepackage{booktabs,graphicx}\n\\begin{document}\n\\input{walk12-table}\n"
         "\\input{walk12-figures}\n\\end{document}\n"

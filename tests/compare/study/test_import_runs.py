@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from compare.analysis.columns import ALL, format_rows, summarise
 from compare.analysis.comparison import compare_problems, label_editions
-from compare.analysis.solver_table import HEADER, describe_unknown, format_cells, summarise
+from compare.analysis.failures import describe_unknown
 from compare.judge import evaluate
 from compare.report import FurtherFiles, rebuild_report
 from compare.study.import_runs import import_runs, read_imported_records, read_points
@@ -79,13 +81,14 @@ def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
     again = read_records(tmp_path)
     assert {record.solver for record in again} == {"pso", "GA (MATLAB)"}
     (comparison,) = compare_problems(again)
-    (ga,) = [s for s in summarise(comparison) if s.solver == "GA (MATLAB)"]
-    row = format_cells(ga, comparison)
-    assert row[-1] == "-" and row[2] == "-" and "nan" not in " ".join(row)
-    assert all(math.isnan(seconds) for seconds in ga.expected_s) and ga.evaluations == 5000
+    (ga,) = [row for row in summarise(comparison) if row["solver"] == "GA (MATLAB)"]
+    header, rows = format_rows(comparison, ALL)
+    shown = dict(zip(header, next(row for row in rows if row[0] == "GA (MATLAB)"), strict=True))
+    assert shown["time [s]"] == shown["claimed"] == "-" and "nan" not in " ".join(shown.values())
+    assert math.isnan(ga["time_s"]) and math.isnan(ga["seconds_to_1"]) and ga["evaluations"] == 5000
     files = rebuild_report(tmp_path, further=FurtherFiles(csv=True))
     page = (tmp_path / "report.md").read_text()
-    assert "GA (MATLAB)" in page and "nan" not in page.lower().replace("nan,", "")
+    assert "GA (MATLAB)" in page and not re.search(r"\bnan\b", page.replace("nan,", ""), re.IGNORECASE)
     with open(next(path for path in files if path.name == "runs.csv")) as file:
         rows = list(csv.DictReader(file))
     assert [r["time_s"] for r in rows if r["solver"] == "GA (MATLAB)"] == ["", "", ""] and len(rows) == 5
@@ -144,12 +147,13 @@ def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_pat
     nlp_gait("report", out, "--csv")
     summaries = {summary["solver"]: summary for summary in json.loads(done.stdout)["problems"]["walk12"]}
     for unknown in (summaries["paper"], summaries["thesis"]):
-        assert unknown["evaluations"] is None and unknown["expected_evaluations"] == [None] * 4
+        assert unknown["evaluations"] is None and unknown["evaluations_to_1"] is None
     assert summaries["GA"]["evaluations"] == 50 and summaries["thesis"]["best"] == summaries["GA"]["best"]
     (comparison,) = compare_problems(read_records(out))
-    assert "-" == format_cells(summarise(comparison)[-1], comparison)[HEADER.index("evaluations")]
+    header, rows = format_rows(comparison, ALL)
+    assert rows[-1][header.index("evaluations")] == "-"
     page = " ".join((out / "report.md").read_text().split())
-    assert "nan" not in page.lower()
+    assert not re.search(r"\bnan\b", page, re.IGNORECASE)
     for solver, runs in (("paper", "1 to 2"), ("thesis", "0 to 2")):
         sentence = (
             f"{solver}, runs {runs} of 3: the number of evaluations is unknown; all statistics of evaluations exclude"

@@ -1,0 +1,163 @@
+"""Columns of the tables of solvers: a statistic is one entry, with the function that computes it and its format."""
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from statistics import median
+from typing import Any
+
+from compare.analysis.comparison import Comparison, SolverRuns
+from compare.analysis.record_statistics import TARGETS, bootstrap_interval
+from compare.analysis.units import format_number, with_unit
+
+FORMATS: dict[str, Callable[[Any, Comparison, SolverRuns], str]] = {
+    "count": lambda value, comparison, solver: format_count(value),
+    "share": lambda value, comparison, solver: f"{value}/{len(solver.records)}",
+    "gap": lambda value, comparison, solver: comparison.format_gap(value),
+    "objective": lambda value, comparison, solver: with_unit(value, comparison.objective.unit),
+    "interval": lambda value, comparison, solver: f"{value[0]:.6f} to {value[1]:.6f}",
+}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A statistic of the runs of a solver on a problem."""
+
+    title: str
+    function: Callable[[Comparison, SolverRuns], Any]  #: returns None for an unknown value
+    format: str  #: an entry of ``FORMATS``, or a format of numbers such as ``".3f"``
+
+    @property
+    def key(self) -> str:
+        """Name in JSON: ``time_s`` for ``time [s]``."""
+        return re.sub(r"\W+", "_", self.title).strip("_")
+
+    def format_cell(self, comparison: Comparison, solver: SolverRuns) -> str:
+        """Return the value as text; a dash for an unknown or infinite one."""
+        value = self.function(comparison, solver)
+        if value is None or (isinstance(value, float) and not math.isfinite(value)):
+            return "-"
+        if self.format in FORMATS:
+            return FORMATS[self.format](value, comparison, solver)
+        return format_number(value, self.format)
+
+
+def format_count(number: float) -> str:
+    """Format a number of evaluations; a dash if it is infinite or unknown."""
+    return f"{number:,.0f}".replace(",", "\u202f") if math.isfinite(number) else "-"
+
+
+def count_claimed(comparison: Comparison, solver: SolverRuns) -> int | None:
+    """Return the number of runs whose solver claims a feasible result; None for imported results without claims."""
+    if all("imported" in r.definition and r.claimed_objective is None for r in solver.records):
+        return None
+    return sum(r.claimed for r in solver.records)
+
+
+def count_dense_feasible(comparison: Comparison, solver: SolverRuns) -> int | None:
+    """Return the number of runs that are feasible between the samples, too; None without a dense grid."""
+    dense = [r.verdict.dense_feasible for r in solver.records]
+    return None if all(value is None for value in dense) else sum(value is True for value in dense)
+
+
+def count_guaranteed(comparison: Comparison, solver: SolverRuns) -> int | None:
+    """Return the number proven to satisfy all limits at all times; None where that was not requested or is impossible."""
+    proofs = [r.verdict.guaranteed for r in solver.records]
+    proven = [proof.satisfied for proof in proofs if proof is not None and not proof.reason]
+    return sum(value is True for value in proven) if proven else None
+
+
+def find_best_claim(comparison: Comparison, solver: SolverRuns) -> float | None:
+    """Return the best objective that a run claims to be feasible."""
+    sign = comparison.objective.sign
+    claims = [sign * r.claimed_objective for r in solver.records if r.claimed and r.claimed_objective is not None]
+    return sign * min(claims) if claims else None
+
+
+def compute_of_feasible(
+    statistic: Callable[[list[float]], float], comparison: Comparison, solver: SolverRuns
+) -> float | None:
+    """Return a statistic of the objectives of the feasible runs."""
+    return comparison.value(statistic(solver.feasible)) if solver.feasible else None
+
+
+def compute_median_interval(comparison: Comparison, solver: SolverRuns) -> tuple[float, ...] | None:
+    """Return the 95 % bootstrap interval of the median objective of the feasible runs."""
+    if not solver.feasible:
+        return None
+    return tuple(sorted(comparison.value(end) for end in bootstrap_interval([solver.feasible], median)))
+
+
+def compute_of_records(
+    statistic: Callable[[list[float]], float], name: str, comparison: Comparison, solver: SolverRuns
+) -> float:
+    """Return a statistic of a time of all runs [s]; NaN if one is unknown."""
+    times = [getattr(r.time_s, name) for r in solver.records]
+    return math.nan if any(map(math.isnan, times)) else statistic(times)
+
+
+def compute_median_evaluations(comparison: Comparison, solver: SolverRuns) -> float:
+    """Return the median of the equivalent evaluations of a run; NaN if those of a run are unknown."""
+    counts = [curve.total_cost() for curve in solver.curves]
+    return math.nan if any(map(math.isnan, counts)) else median(counts)
+
+
+def _make_cost_columns(axis: str, title: str, form: str) -> tuple[Column, ...]:
+    return tuple(
+        Column(f"{title} to {100 * t:g} %", lambda _, solver, t=t: solver.expected_cost(t, axis), form)  # type: ignore[misc]
+        for t in TARGETS
+    )
+
+
+# Expected running time: cost of all runs until the target, divided by the number that reached it; infinite if none did.
+EVALUATIONS_TO = _make_cost_columns("evaluations", "evaluations", "count")
+SECONDS_TO = _make_cost_columns("seconds", "seconds", ".3g")
+# On the first screen of a report.
+MAIN = (
+    Column("feasible", lambda _, solver: len(solver.feasible), "share"),
+    Column("median gap", lambda comparison, solver: comparison.gap(solver.median_cost), "gap"),
+    Column("best gap", lambda comparison, solver: comparison.gap(min(solver.costs)), "gap"),
+    EVALUATIONS_TO[0],
+    Column("time [s]", partial(compute_of_records, median, "solve"), ".3f"),
+    Column("guaranteed", count_guaranteed, "share"),
+)
+PRINTED = (*MAIN[:2], *MAIN[3:])  # in a terminal of 80 columns
+# Claims of the solvers, and what the judge finds with the exact functions.
+JUDGEMENT = (
+    Column("runs", lambda _, solver: len(solver.records), "d"),
+    Column("claimed", count_claimed, "share"),
+    MAIN[0],
+    Column("feasible between samples", count_dense_feasible, "share"),
+    Column("best claimed", find_best_claim, "objective"),
+    Column("best", partial(compute_of_feasible, min), "objective"),
+    Column("median", partial(compute_of_feasible, median), "objective"),
+    Column("worst", partial(compute_of_feasible, max), "objective"),
+    Column("median interval", compute_median_interval, "interval"),
+)
+EFFORT = (
+    Column("evaluations", compute_median_evaluations, "count"),
+    Column("build [s]", partial(compute_of_records, max, "build"), ".2f"),
+    Column("compile [s]", partial(compute_of_records, max, "compile"), ".2f"),
+    MAIN[4],
+)
+ALL = tuple(dict.fromkeys((*JUDGEMENT, *MAIN, *EFFORT, *EVALUATIONS_TO, *SECONDS_TO)))
+
+
+def summarise(comparison: Comparison, columns: Sequence[Column] = ALL) -> list[dict[str, Any]]:
+    """Return the values of all columns by key, for each solver, the best median first."""
+    return [
+        {"solver": solver.name, **{column.key: column.function(comparison, solver) for column in columns}}
+        for solver in comparison.solvers
+    ]
+
+
+def format_rows(
+    comparison: Comparison, columns: Sequence[Column] = MAIN
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and rows of text, a row for each solver; a column in which nothing is known is left out."""
+    cells = {c.title: [c.format_cell(comparison, solver) for solver in comparison.solvers] for c in columns}
+    known = {title: texts for title, texts in cells.items() if set(texts) != {"-"}}
+    names = [solver.name for solver in comparison.solvers]
+    return ("solver", *known), list(zip(names, *known.values(), strict=True))

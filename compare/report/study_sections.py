@@ -1,0 +1,296 @@
+"""The headings of a study's report that open on demand: convergence, costs, significance, the optimum, settings."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+
+from compare.analysis.columns import EFFORT, EVALUATIONS_TO, JUDGEMENT, SECONDS_TO
+from compare.analysis.comparison import Comparison
+from compare.analysis.failures import describe_unknown
+from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers, rank_over_problems
+from compare.analysis.simulated_gaits import GAIT_HEADER, describe_drive, make_engine_rows, measure_agreement
+from compare.analysis.units import BY_UNIT
+from compare.drawing.charts import encode_charts, plot_charts
+from compare.drawing.comparison_figures import (
+    chart_performance_profile,
+    list_expected_costs,
+    plot_critical_difference,
+)
+from compare.drawing.gait_figure import GaitCurves, chart_gaits
+from compare.report.document import Figure, Part, Prose, Section, Table, make_table_section, make_text_table
+from compare.report.problem_section import make_figure, make_statistics_table
+from compare.report.provenance import TERMS, format_settings, make_solver_table
+from compare.report.writing import make_citation_section, make_session_section
+from compare.study.record import RunRecord
+from compare.study.settings import Session
+from compare.study.simulations import SimulatedGait
+from nlp_gait.files import make_file_name
+from nlp_gait.formulation.solution import ActiveConstraint
+
+SHOWN_CONSTRAINTS = 15
+HOW = Prose(
+    "`nlp-gait report DIR --engine` simulates the best gaits in MuJoCo (extra `sim`) and adds their energy and rank here."
+)
+
+
+def make_folded_section(
+    title: str, comparisons: Sequence[Comparison], make_parts: Callable[[Comparison], Iterable[Part]], *ending: Part
+) -> Section:
+    """Return a section that opens on demand, with a section for each of several problems."""
+    if len(comparisons) == 1:
+        return Section(title=title, parts=(*make_parts(comparisons[0]), *ending), folded=True)
+    sections = [Section(title=c.problem, parts=parts) for c in comparisons if (parts := tuple(make_parts(c)))]
+    return Section(title=title, parts=(*sections, *ending), folded=True)
+
+
+def list_convergence(comparison: Comparison) -> tuple[Part, ...]:
+    """Return the gaps over costs."""
+    return (make_figure(comparison, "convergence"),)
+
+
+def list_costs(comparison: Comparison) -> tuple[Part, ...]:
+    """Return costs to targets, the effort, and the failed runs."""
+    return (
+        make_figure(comparison, "runtime"),
+        *describe_unknown(comparison),
+        make_statistics_table(
+            comparison,
+            (*EVALUATIONS_TO, *SECONDS_TO),
+            "Expected running time: cost of all runs until the target, divided by the number that reached it",
+        ),
+        make_statistics_table(
+            comparison, EFFORT, "Medians of a run; build and compile are the longest, once for each process"
+        ),
+        *_list_failures(comparison),
+    )
+
+
+def _list_failures(comparison: Comparison) -> tuple[Section, ...]:
+    rows = [
+        (r.solver, str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-")
+        for r in comparison.records
+        if not r.verdict.feasible
+    ]
+    header = ("solver", "run", "seed", "status", "violated, worst first")
+    return make_table_section("Runs that ended infeasible or failed", header, rows, prose=True)
+
+
+def list_tests(comparison: Comparison) -> tuple[Table, ...]:
+    """Return the tests of all pairs of solvers."""
+    rows = [
+        (
+            f"{pair.first} < {pair.second}",
+            _format_p(pair.rank_sum),
+            "-" if pair.signed_rank is None else _format_p(pair.signed_rank),
+            str(pair.paired_runs),
+            f"{pair.a12:.3f}",
+        )
+        for pair in comparison.pairs
+    ]
+    header = ("better median < other", "rank-sum p", "signed-rank p", "pairs of runs", "A12")
+    return (make_text_table(header, rows),) if rows else ()
+
+
+TESTS = (
+    "Two-sided p-values on the final objectives, Holm-corrected over all pairs: rank-sum over all runs, signed-rank over runs "
+    "with equal starting points. A12 is the probability that a run of the first solver ends better (0.5: no difference; above "
+    "0.71: large)."
+)
+
+
+def _format_p(value: float) -> str:
+    return f"{value:.4f}" if value >= 1e-4 else f"{value:.1e}"
+
+
+def list_optimum(
+    comparison: Comparison, gaits: Mapping[str, GaitCurves] | str, simulated: Sequence[SimulatedGait]
+) -> tuple[Part, ...]:
+    """Return active constraints with prices, the gaits over time, in the engine, and limits between the samples."""
+    charts = [] if isinstance(gaits, str) or not gaits else chart_gaits(gaits)
+    curves = Figure(
+        name=f"{make_file_name(comparison.problem)}-curves",
+        caption="Best gait of each solver. The deviation is the largest distance of a joint from its place in the best gait "
+        "after the same share of the time. Mechanical power is the sum of |torque x rate| over the joints. The balance margin "
+        "is the distance of the zero-moment point from the nearest edge of the support polygon, negative outside of it.",
+        drawing=partial(plot_charts, charts, 3),
+        data=encode_charts(charts),
+    )
+    return (
+        *_list_active(comparison),
+        *((curves,) if charts else ()),
+        *make_engine_section([gait for gait in simulated if gait.problem == comparison.problem]),
+        *_list_violated_between(comparison),
+    )
+
+
+def _list_active(comparison: Comparison) -> tuple[Section, ...]:
+    priced = [
+        (cost, record)
+        for solver in comparison.solvers
+        for cost, record in zip(solver.costs, solver.records, strict=True)
+        if record.active_constraints and record.verdict.feasible
+    ]
+    if not priced:
+        return ()
+    record = min(priced, key=lambda item: item[0])[1]
+    rows = [
+        (
+            active.name,
+            active.side,
+            f"{active.bound:g} {active.unit}",
+            f"{active.price:.4g} {active.price_unit}",
+            _describe_step(active, comparison.objective.unit),
+        )
+        for active in record.active_constraints[:SHOWN_CONSTRAINTS]
+    ]
+    left_out = len(record.active_constraints) - len(rows)
+    note = f" {left_out} lower ones are omitted." if left_out else ""
+    return make_table_section(
+        "Active constraints",
+        ("constraint", "side", "at", "price", "for a step"),
+        rows,
+        f"At the best optimum of {record.solver} (run {record.run}). The price is the change of the optimal "
+        f"{comparison.objective.name} per unit by which the bound is raised, highest first.{note}",
+    )
+
+
+def _describe_step(active: ActiveConstraint, unit: str) -> str:
+    """Return for example ``+0.0237 W for 1 mm``."""
+    step = BY_UNIT.get(active.unit)
+    if step is None:
+        return "-"
+    return f"{active.price * step.size:+z.4f}{'' if unit == '1' else f' {unit}'} for {step.words}"
+
+
+def make_engine_section(simulated: Sequence[SimulatedGait]) -> tuple[Section, ...]:
+    """Return the section on every solver's best gait in the engine, for each drive; none without simulations."""
+    if not simulated:
+        return ()
+    parts: list[Part] = []
+    for drive in dict.fromkeys(gait.drive for gait in simulated):
+        alike = [gait for gait in simulated if gait.drive == drive]
+        parts.append(make_text_table(GAIT_HEADER, make_engine_rows(alike), f"Best gaits; {describe_drive(drive)}"))
+        parts.append(measure_agreement(alike).describe())
+    steps = simulated[0].steps
+    figure = (
+        "mean power over the phase"
+        if steps is None
+        else f"energy for each planned metre over {steps} steps, every second one mirrored"
+    )
+    introduction = (
+        f"Every solver's best gait, simulated open loop in MuJoCo. Model and engine: {figure}, mechanical and heat. The "
+        "model's value and rank refer to the planned motion on a dense grid. Ranks use the printed digits; a gait "
+        "that falls has none. For a cycle that does not fall, the walked share of the planned distance is given."
+    )
+    return (Section(title="In the physics engine", parts=(introduction, *parts)),)
+
+
+def _list_violated_between(comparison: Comparison) -> tuple[Section, ...]:
+    rows = [
+        (r.solver, str(r.run), "; ".join(r.verdict.violated[:3]) or "-", _describe_proof(r))
+        for r in comparison.records
+        if r.verdict.feasible and (r.verdict.dense_feasible is False or _describe_proof(r) != "-")
+    ]
+    header = ("solver", "run", "violated on a dense grid, worst first", "proven at all times")
+    return make_table_section("Feasible at the samples, not at all times", header, rows, prose=True)
+
+
+def _describe_proof(record: RunRecord) -> str:
+    """Return what is violated between the samples, or not proven to be satisfied."""
+    proof = record.verdict.guaranteed
+    return "-" if proof is None or proof.satisfied or proof.reason else str(proof)
+
+
+def make_settings_section(comparisons: Sequence[Comparison], sessions: Sequence[Session]) -> Section:
+    """Return what the solvers claim, how costs are counted, all settings, sessions, citations and terms."""
+    sizes = [max((len(r.x) for r in c.records), default=0) for c in comparisons]
+    weights = [
+        (c.problem, *map("{:g}".format, c.weighting.of_kind(n).values()))
+        for c, n in zip(comparisons, sizes, strict=True)
+    ]
+    problems = {c.problem: c.records[0].definition["problem"] for c in comparisons}
+    options = [
+        (name, format_settings(problem["parameters"]) or "none", format_settings(problem["options"]))
+        for name, problem in problems.items()
+    ]
+    return make_folded_section(
+        "Settings and provenance",
+        comparisons,
+        lambda c: (make_statistics_table(c, JUDGEMENT, f"Claims and judgement; best known value: {c.known.source}"),),
+        "Claimed is what the solvers report. Everything else is what the judge finds with the exact functions at the reported "
+        "point. Searches with equal seeds start from the same points; run k has the study's seed plus k. Defaults are those of "
+        "the sources; none was tuned on these problems.",
+        make_solver_table(record for comparison in comparisons for record in comparison.records),
+        make_text_table(("problem", "changed values", "options"), options, prose=True),
+        make_text_table(
+            ("problem", "f", "g", "gradient", "Jacobian", "Hessian"),
+            weights,
+            "Weight of a call in equivalent evaluations. Objective and constraints count separately where they are called "
+            "separately, so gradient methods are never favoured; a gradient run reaches its targets at its end. A polished run "
+            "includes the cost of its search. Times are wall times of the solve, without building or compiling",
+        ),
+        *(make_session_section(number, session) for number, session in enumerate(sessions, start=1)),
+        make_citation_section(problems.values()),
+        TERMS,
+    )
+
+
+def make_overview(comparisons: Sequence[Comparison]) -> Section:
+    """Return the section on all problems of a study together."""
+    ranking = rank_over_problems(comparisons)
+    parts: list[Part] = [
+        "To see whether one solver is better in general: median gaps to the best known value over all runs. A star marks the "
+        "best median and those that do not differ from it significantly (rank-sum test at 5 %, Holm-corrected over all pairs on "
+        f"the problem). Ranks are those of the medians, of solvers that ran on all problems. {describe_tests(ranking)}".strip(),
+        _make_matrix(comparisons, ranking),
+        *(make_wins_table(comparisons, solver) for solver in list_user_solvers(comparisons)),
+    ]
+    if list_expected_costs(comparisons):
+        charts = chart_performance_profile(comparisons)
+        parts.append(
+            Figure(
+                name="performance-profile",
+                caption="Share of problems and targets that a solver reaches within a factor of the cheapest one's expected "
+                "evaluations.",
+                drawing=partial(plot_charts, charts),
+                data=encode_charts(charts),
+            )
+        )
+    if ranking.critical_difference is not None:
+        parts.append(
+            Figure(
+                name="critical-difference",
+                caption=f"Mean ranks of the medians; a bar joins solvers that do not differ. {describe_tests(ranking)}",
+                drawing=partial(plot_critical_difference, ranking),
+            )
+        )
+    return Section(title="All problems", parts=parts)
+
+
+def _make_matrix(comparisons: Sequence[Comparison], ranking: Ranking) -> Table:
+    ranks = ranking.mean_ranks
+    names = list(dict.fromkeys([*ranks, *(solver.name for c in comparisons for solver in c.solvers)]))
+    rows = []
+    for comparison in comparisons:
+        medians = {solver.name: solver.median_cost for solver in comparison.solvers}
+        rows.append((comparison.problem, *(_format_cell(comparison, name, medians) for name in names)))
+    rows.append(("mean rank", *(f"{ranks[name]:.2f}" if name in ranks else "-" for name in names)))
+    return make_text_table(("problem", *names), rows, "Median gap of each solver on each problem")
+
+
+def _format_cell(comparison: Comparison, name: str, medians: Mapping[str, float]) -> str:
+    if name not in medians:
+        return "-"
+    gap = comparison.gap(medians[name])
+    star = " *" if name in comparison.leaders else ""
+    return f"{comparison.format_gap(gap)}{star}" if math.isfinite(gap) else "infeasible"
+
+
+def make_wins_table(comparisons: Sequence[Comparison], solver: str) -> Table:
+    """Return on how many problems a solver is better or worse than each other one."""
+    rows = [(r.other, str(r.wins), str(r.ties), str(r.losses)) for r in count_wins(comparisons, solver)]
+    caption = (
+        f"Problems on which {solver} is significantly better, not different, or worse (rank-sum test of the final objectives at "
+        "5 %, Holm-corrected over all pairs on the problem)"
+    )
+    return make_text_table(("against", "wins", "ties", "losses"), rows, caption)
