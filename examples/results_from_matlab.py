@@ -12,7 +12,7 @@ from pathlib import Path
 from compare.analysis.columns import summarise
 from compare.analysis.comparison import compare_problems
 from compare.drawing.charts import plot_charts
-from compare.drawing.comparison_figures import chart_final_gaps
+from compare.drawing.comparison_figures import make_final_gap_charts
 from compare.study.import_runs import import_runs
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Task
@@ -44,5 +44,5 @@ for row in summarise(comparison):
 # %%
 # The gap of every run at its end.
 
-figure = plot_charts(chart_final_gaps(comparison))
+figure = plot_charts(make_final_gap_charts(comparison))
 figure

@@ -14,7 +14,7 @@ import numpy as np
 from compare.analysis.columns import format_rows
 from compare.analysis.comparison import compare_problems
 from compare.drawing.charts import plot_charts
-from compare.drawing.comparison_figures import chart_convergence
+from compare.drawing.comparison_figures import make_convergence_charts
 from compare.report.document import Document, make_text_table
 from compare.report.writing import render_markdown
 from compare.study.run_study import Study, run_study
@@ -72,5 +72,5 @@ print(render_markdown(Document(title="A shrinking box", parts=[table])))
 # %%
 # The best gap so far over evaluations and seconds.
 
-figure = plot_charts(chart_convergence(comparison))
+figure = plot_charts(make_convergence_charts(comparison))
 figure

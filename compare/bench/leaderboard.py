@@ -13,7 +13,7 @@ from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
 from compare.bench.baseline import EVALUATIONS, get_reference, load_baseline
 from compare.drawing.charts import encode_charts, plot_charts
-from compare.drawing.comparison_figures import chart_suite_ecdf
+from compare.drawing.comparison_figures import make_suite_ecdf_charts
 from compare.report.document import Document, Figure, Section, Table, make_text_table
 from compare.report.provenance import TERMS
 from compare.report.study_sections import make_wins_table
@@ -102,7 +102,7 @@ def make_leaderboard_page(
     count_of = len(board.comparisons)
     runs = sorted({len(solver.records) for comparison in board.comparisons for solver in comparison.solvers})
     targets = ", ".join(f"{100 * target:g} %" for target in TARGETS)
-    charts = chart_suite_ecdf(board.comparisons)
+    charts = make_suite_ecdf_charts(board.comparisons)
     title = f"GaitBench, {suite}: {count_of} instances, {len(board.standings)} solvers"
     return Document(
         title=title if solver is None else f"{solver} on {title}",

@@ -30,7 +30,7 @@ GAP = "gap to the best known [%]"
 SHARES = (0.0, 1.02)  # range of an axis
 
 
-def chart_final_gaps(comparison: Comparison) -> list[Chart]:
+def make_final_gap_charts(comparison: Comparison) -> list[Chart]:
     """Return the final gap of each run, one row per solver, its median as a bar and the judge's tolerance as a line."""
     series, rows = [], []
     for place, solver in enumerate(comparison.solvers):
@@ -51,15 +51,15 @@ def chart_final_gaps(comparison: Comparison) -> list[Chart]:
     return [Chart(x=GAP, y="", series=series, log=(True, False), rows=rows, range=limits, mark=mark)]
 
 
-def chart_convergence(comparison: Comparison) -> list[Chart]:
+def make_convergence_charts(comparison: Comparison) -> list[Chart]:
     """Return bands from the least to the greatest gap of all runs, with the median, over evaluations and over seconds.
 
     A line begins where half of the runs are feasible, a band where all are. A run of a gradient method is a point at its end.
     """
-    return _chart_by_cost(comparison, _trace_gaps, GAP, (True, True))
+    return _make_charts_by_cost(comparison, _trace_gaps, GAP, (True, True))
 
 
-def chart_ecdf(comparison: Comparison) -> list[Chart]:
+def make_ecdf_charts(comparison: Comparison) -> list[Chart]:
     """Return the share of all pairs of run and target solved within a cost, in evaluations and in seconds."""
 
     def trace(solver: SolverRuns, axis: str) -> list[Series]:
@@ -67,10 +67,10 @@ def chart_ecdf(comparison: Comparison) -> list[Chart]:
         costs = np.array([c.cost_to_reach(target, axis) for c in solver.curves for target in ECDF_TARGETS])
         return [_make_share(solver.name, *compute_ecdf(costs), last)]
 
-    return _chart_by_cost(comparison, trace, "share of runs and targets", (True, False), SHARES)
+    return _make_charts_by_cost(comparison, trace, "share of runs and targets", (True, False), SHARES)
 
 
-def _chart_by_cost(
+def _make_charts_by_cost(
     comparison: Comparison,
     trace: Callable[[SolverRuns, str], list[Series]],
     y: str,
@@ -122,7 +122,7 @@ def _make_share(name: str, costs: Array, share: Array, last: float) -> Series:
     return Series(name=name, x=costs, y=share, shape="step")
 
 
-def chart_suite_ecdf(comparisons: Sequence[Comparison]) -> list[Chart]:
+def make_suite_ecdf_charts(comparisons: Sequence[Comparison]) -> list[Chart]:
     """Return the share of problems, runs and targets solved within evaluations per variable; solvers that ran on all."""
     solvers, shared = index_solvers(comparisons)
     shares, last = {}, 1.0
@@ -137,7 +137,7 @@ def chart_suite_ecdf(comparisons: Sequence[Comparison]) -> list[Chart]:
     return [Chart(x="equivalent evaluations per variable", y=words, series=series, log=(True, False), range=SHARES)]
 
 
-def chart_performance_profile(comparisons: Sequence[Comparison]) -> list[Chart]:
+def make_profile_charts(comparisons: Sequence[Comparison]) -> list[Chart]:
     """Return the performance profile of expected running times over problems and targets; solvers that ran on all."""
     profile = compute_profiles(list_expected_costs(comparisons))
     last = max([factor[-1] for factor, _ in profile.values() if factor.size], default=1.0) * 2.0

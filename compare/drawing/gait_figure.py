@@ -76,7 +76,7 @@ def plot_gaits(gaits: Mapping[str, GaitCurves], *, curves: bool = True) -> Figur
     Raises:
         InputError: there is nothing to draw.
     """
-    charts = chart_gaits(gaits) if curves else []
+    charts = make_gait_charts(gaits) if curves else []
     (name, first), *others = gaits.items()
     count = (first.skeleton is not None) + len(charts)
     if not count:
@@ -99,7 +99,7 @@ def plot_gaits(gaits: Mapping[str, GaitCurves], *, curves: bool = True) -> Figur
     return figure
 
 
-def chart_gaits(gaits: Mapping[str, GaitCurves]) -> list[Chart]:
+def make_gait_charts(gaits: Mapping[str, GaitCurves]) -> list[Chart]:
     """Return the deviation of each gait from the first one, the power and the balance margin over time."""
     first, *others = gaits.values()
     curves: dict[str, dict[str, Array | None]] = {

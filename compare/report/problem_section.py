@@ -6,7 +6,7 @@ from functools import partial
 from compare.analysis.columns import MAIN, Column, format_rows
 from compare.analysis.comparison import Comparison
 from compare.drawing.charts import encode_charts, plot_charts
-from compare.drawing.comparison_figures import chart_convergence, chart_ecdf, chart_final_gaps
+from compare.drawing.comparison_figures import make_convergence_charts, make_ecdf_charts, make_final_gap_charts
 from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
 from compare.report.document import Figure, Part, Section, Table, make_text_table
 from compare.report.interactive import describe_gaits
@@ -16,14 +16,14 @@ from nlp_gait.files import make_file_name
 
 # Figures of a problem by name: the function from its comparison to charts, and the caption.
 FIGURES = {
-    "final": (chart_final_gaps, "Every run; bar: median; dotted: tolerance."),
+    "final": (make_final_gap_charts, "Every run; bar: median; dotted: tolerance."),
     "convergence": (
-        chart_convergence,
+        make_convergence_charts,
         "Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end. Gaps below the "
         "judge's tolerance are drawn at that value.",
     ),
     "runtime": (
-        chart_ecdf,
+        make_ecdf_charts,
         "Share of pairs of run and target solved within a cost; 31 targets, 100 % to 1e-4 % above the best known.",
     ),
 }

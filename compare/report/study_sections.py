@@ -12,11 +12,11 @@ from compare.analysis.simulated_gaits import GAIT_HEADER, describe_drive, make_e
 from compare.analysis.units import BY_UNIT
 from compare.drawing.charts import encode_charts, plot_charts
 from compare.drawing.comparison_figures import (
-    chart_performance_profile,
     list_expected_costs,
+    make_profile_charts,
     plot_critical_difference,
 )
-from compare.drawing.gait_figure import GaitCurves, chart_gaits
+from compare.drawing.gait_figure import GaitCurves, make_gait_charts
 from compare.report.document import Figure, Part, Prose, Section, Table, make_table_section, make_text_table
 from compare.report.problem_section import make_figure, make_statistics_table
 from compare.report.provenance import TERMS, format_settings, make_solver_table
@@ -106,7 +106,7 @@ def list_optimum(
     comparison: Comparison, gaits: Mapping[str, GaitCurves] | str, simulated: Sequence[SimulatedGait]
 ) -> tuple[Part, ...]:
     """Return active constraints with prices, the gaits over time, in the engine, and limits between the samples."""
-    charts = [] if isinstance(gaits, str) or not gaits else chart_gaits(gaits)
+    charts = [] if isinstance(gaits, str) or not gaits else make_gait_charts(gaits)
     curves = Figure(
         name=f"{make_file_name(comparison.problem)}-curves",
         caption="Best gait of each solver. The deviation is the largest distance of a joint from its place in the best gait "
@@ -246,7 +246,7 @@ def make_overview(comparisons: Sequence[Comparison]) -> Section:
         *(make_wins_table(comparisons, solver) for solver in list_user_solvers(comparisons)),
     ]
     if list_expected_costs(comparisons):
-        charts = chart_performance_profile(comparisons)
+        charts = make_profile_charts(comparisons)
         parts.append(
             Figure(
                 name="performance-profile",

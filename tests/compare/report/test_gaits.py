@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compare.analysis.comparison import Comparison, compare_problems
-from compare.drawing.gait_figure import chart_gaits, measure_deviation, plot_gaits
+from compare.drawing.gait_figure import make_gait_charts, measure_deviation, plot_gaits
 from compare.report.problem_section import load_gaits
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import Limb, Skeleton
@@ -25,7 +25,7 @@ def comparison(name: str, x: dict[str, float], *solvers: str) -> Comparison:
 def test_the_best_gait_is_drawn_and_the_others_as_deviations_from_it() -> None:
     gaits = load_gaits(comparison("nao-dsp", DSP_X, "pso", "ga"))
     assert not isinstance(gaits, str)
-    deviation, power, margin = charts = chart_gaits(gaits)
+    deviation, power, margin = charts = make_gait_charts(gaits)
     assert [len(chart.series) for chart in charts] == [1, 2, 2]
     assert [chart.y for chart in charts] == ["deviation [mm]", "mechanical power [W]", "balance margin [mm]"]
     assert abs(deviation.series[0].y).max() < 1e-9  # both have the same gait
