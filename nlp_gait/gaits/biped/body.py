@@ -198,11 +198,11 @@ class Body(ABC):
     def angle_ends(self, phase: Support, at: InstantPoint) -> Mapping[str, tuple[SX, SX]]:
         """Return these angles at the start and the end of a phase [rad]."""
 
-    def angles(self, phase: Support, at: InstantPoint, more: Angles, duration: SX, s: SX) -> Angles:
-        """Return the motion of these angles: cubics from rest to rest, and what the splines ``more`` add."""
+    def angles(self, phase: Support, at: InstantPoint, splines: Angles, duration: SX, s: SX) -> Angles:
+        """Return the motion of these angles: cubics from rest to rest, and what ``splines`` add."""
         still = SX(0)
         return {
-            name: add_motions(cubic(start, end, still, still, duration, s), more[name])
+            name: add_motions(cubic(start, end, still, still, duration, s), splines[name])
             for name, (start, end) in self.angle_ends(phase, at).items()
         }
 

@@ -67,8 +67,8 @@ class Splines:
         """Return start points with coefficients near zero and the other variables within their bounds; None without splines."""
         if self.count == 0:
             return None
-        own = {variable.name for variable in self.variables}
-        share = np.array([START_SHARE if name in own else 1.0 for name in names])
+        coefficients = {variable.name for variable in self.variables}
+        share = np.array([START_SHARE if name in coefficients else 1.0 for name in names])
 
         def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
             lower, upper = (np.array([parameters[f"{name}.{end}"] for name in names]) for end in ("lower", "upper"))
@@ -80,7 +80,7 @@ class Splines:
 
 def move_hip(
     at: InstantPoint,
-    more: Mapping[str, Motion],
+    curves: Mapping[str, Motion],
     along: tuple[float, float],
     across: tuple[float, float],
     duration: SX,
@@ -99,7 +99,7 @@ def move_hip(
         cubic(start, end, at[f"hip_v{axis}_start_m_s"], at[f"hip_v{axis}_end_m_s"], duration, phase)
         for axis, (start, end) in ends.items()
     )
-    return add_motions(stack(*paper), stack(*(more[curve] for curve in HIP_CURVES)))
+    return add_motions(stack(*paper), stack(*(curves[curve] for curve in HIP_CURVES)))
 
 
 def make_grid(

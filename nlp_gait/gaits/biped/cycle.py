@@ -68,7 +68,7 @@ class WalkingCycle(Sequence):
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters of both phases; those of balance begin with the phase's name."""
         both = self.phase_parameters
-        balance, shared = ([p for p in both if p.name.endswith(BALANCE) == own] for own in (True, False))
+        balance, shared = ([p for p in both if p.name.endswith(BALANCE) == of_balance] for of_balance in (True, False))
         jump = ("largest jump of a torque at a switch; the default is out of reach", 0.0, math.inf)
         limit = make_parameters((TORQUE_JUMP, "Nm", NO_JUMP_LIMIT * math.ceil(self.body.torque_scale), *jump))
         step = self.variables[-1]
@@ -131,7 +131,7 @@ def make_walking_cycle(
     *motion, step = make_cycle_variables(body, inelastic)
     variables = (*motion, *sharing.variables, step)
     plans, margins = make_cycle_planners(body, inelastic), make_cycle_margins(body)
-    own: dict[Support, tuple[Planner, Loader, tuple[Limit, ...]]] = {
+    ingredients: dict[Support, tuple[Planner, Loader, tuple[Limit, ...]]] = {
         Support.SINGLE: (plans[Support.SINGLE], make_single_support_loads(body), ()),
         Support.DOUBLE: (sharing.add_to(plans[Support.DOUBLE]), sharing.loads, sharing.limits),
     }
@@ -143,11 +143,11 @@ def make_walking_cycle(
             plan=plan,
             loads=loads,
             grid=grid,
-            limits=(*make_phase_limits(body, margins[name]), *body.motors.limits, *more),
+            limits=(*make_phase_limits(body, margins[name]), *body.motors.limits, *load_limits),
             goal=goal,
             standing=name.standing,
         )
-        for name, (plan, loads, more) in own.items()
+        for name, (plan, loads, load_limits) in ingredients.items()
     }
     touch_down = Impact(name="touch_down") if inelastic else Switch(name="touch_down")
     return WalkingCycle(

@@ -117,12 +117,12 @@ def make_cycle_planners(body: Body, inelastic: bool = False) -> dict[Support, Pl
         return PhaseMotion(lift_off, touch_down, read_duration(at, Support.SINGLE), -step, step, at[LIFT], speed)
 
     def double(at: InstantPoint) -> PhaseMotion:
-        (hip, velocity, others, rates), touch_down, step = read(at)
+        (hip, velocity, angles, rates), touch_down, step = read(at)
         place = mirror * hip + vertcat(step, 0, 0)  # the mirror image of lift-off, a step further
         if inelastic:
             velocity_after, rates_after = read_rates(at, AFTER, body.coordinates)
             touch_down = touch_down._replace(hip_velocity=velocity_after, others_rate=rates_after)
-        end = SwitchState(place, mirror * velocity, images * others, images * rates)
+        end = SwitchState(place, mirror * velocity, images * angles, images * rates)
         return PhaseMotion(touch_down, end, read_duration(at, Support.DOUBLE), step, step)
 
     return {Support.SINGLE: make_planner(body, single), Support.DOUBLE: make_planner(body, double)}

@@ -45,7 +45,7 @@ class Foothold(NamedTuple):
 
 def parse_footholds(text: str) -> tuple[Foothold, ...]:
     """Return footholds from rows ``x,y,z,yaw`` [m, degrees], separated by semicolons, all at height zero; raises InputError."""
-    found = []
+    footholds = []
     for k, row in enumerate(text.split(";"), 1):
         try:
             x, y, z, yaw = (float(part) for part in row.split(","))
@@ -57,10 +57,10 @@ def parse_footholds(text: str) -> tuple[Foothold, ...]:
             raise InputError(
                 f"foothold {k} is {z:g} m high, but footholds are planned on a level floor; write 0, or climb with stairs"
             )
-        found.append(Foothold(x, y, math.radians(yaw)))
-    if not 2 <= len(found) <= MOST_FOOTHOLDS:
-        raise InputError(f"a walk has 2 to {MOST_FOOTHOLDS} footholds, got {len(found)}")
-    return tuple(found)
+        footholds.append(Foothold(x, y, math.radians(yaw)))
+    if not 2 <= len(footholds) <= MOST_FOOTHOLDS:
+        raise InputError(f"a walk has 2 to {MOST_FOOTHOLDS} footholds, got {len(footholds)}")
+    return tuple(footholds)
 
 
 def read_footholds(path: str | Path) -> str:
@@ -73,7 +73,7 @@ def read_footholds(path: str | Path) -> str:
 
 def list_arc(turn_deg: float, steps: int, distance_m: float, feet_y: tuple[float, float]) -> str:
     """Return the footholds of a turn to the left along an arc, or of a line; steps advance equally, and the last foot closes."""
-    found, turn = [], math.radians(turn_deg)
+    rows, turn = [], math.radians(turn_deg)
     for k in range(1, steps + 1):
         share, y = min(k / (steps - 1), 1.0), feet_y[k % 2]
         if turn:
@@ -81,8 +81,8 @@ def list_arc(turn_deg: float, steps: int, distance_m: float, feet_y: tuple[float
             y += distance_m / turn
         else:
             x = share * distance_m
-        found.append(",".join(f"{value:.9g}" for value in (x, y, 0.0, share * turn_deg)))
-    return ";".join(found)
+        rows.append(",".join(f"{value:.9g}" for value in (x, y, 0.0, share * turn_deg)))
+    return ";".join(rows)
 
 
 def list_swings(footholds: Sequence[Foothold], feet_y: tuple[float, float]) -> list[tuple[Foothold, Foothold]]:
@@ -110,8 +110,8 @@ def _separate(first: Array, second: Array) -> bool:
     """Return whether a side of one of two rectangles (4, 2) separates them."""
     for corners in (first, second):
         for a, b in pairwise(corners[:3]):
-            one, other = ((outline @ (b - a)) for outline in (first, second))
-            if one.max() <= other.min() or other.max() <= one.min():
+            one, second_along = ((outline @ (b - a)) for outline in (first, second))
+            if one.max() <= second_along.min() or second_along.max() <= one.min():
                 return True
     return False
 

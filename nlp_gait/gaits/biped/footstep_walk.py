@@ -172,18 +172,18 @@ def make_footstep_planner(body: Body, turning: bool, swings: bool) -> Planner:
 
 def make_footstep_variables(body: Body, steps: int) -> tuple[Variable, ...]:
     """Return the variables of a walk of so many steps: the pose at both ends, and states, swing and times of each step."""
-    own: Mapping[str, Variable] = {variable.name: variable for variable in make_cycle_variables(body)}
-    found = [
+    of_cycle: Mapping[str, Variable] = {variable.name: variable for variable in make_cycle_variables(body)}
+    variables = [
         *make_pose_variables(body),
-        replace(own[TIMES[Support.DOUBLE]], name=SHIFT, description="duration of the phase shift"),
+        replace(of_cycle[TIMES[Support.DOUBLE]], name=SHIFT, description="duration of the phase shift"),
     ]
     states = list_states(steps)
     for k in range(1, steps + 1):
         for state in states[2 * k - 2 : 2 * k]:
-            found += state.make_variables(body)
-        others = (own[name] for name in (LIFT, *TIMES.values()))
-        found += [replace(v, name=f"step{k}_{v.name}", description=f"{v.description}, step {k}") for v in others]
-    return tuple(found)
+            variables += state.make_variables(body)
+        swing = (of_cycle[name] for name in (LIFT, *TIMES.values()))
+        variables += [replace(v, name=f"step{k}_{v.name}", description=f"{v.description}, step {k}") for v in swing]
+    return tuple(variables)
 
 
 def plan_footstep_walk(body: Body, footholds: tuple[Foothold, ...], steps: int, grid: Grid) -> GaitProblem:
@@ -193,10 +193,10 @@ def plan_footstep_walk(body: Body, footholds: tuple[Foothold, ...], steps: int, 
     turning = any(foothold.yaw for foothold in footholds)
     loads = make_divided_loads(body, "lever")
     body = replace(body, upright=frozenset()) if turning else body  # a swinging foot turns
-    feet, (*others, last) = list_feet(footholds, body.feet_y), make_phase_variables(body)
+    feet, (*first, last) = list_feet(footholds, body.feet_y), make_phase_variables(body)
     given = (replace(last, name=name, unit=name.rpartition("_")[2], description="of the right foot") for name in RIGHT)
     planners = [make_footstep_planner(body, turning, swings) for swings in (False, True)]
-    phases = make_walk_phases(body, (*others[:-1], *given), planners, grid, loads)
+    phases = make_walk_phases(body, (*first[:-1], *given), planners, grid, loads)
     least = compute_sole_margins(body.robot.feet["left"], (LEAST_SHARE, LEAST_SHARE))
     phases[Support.SINGLE] = replace_margins(phases[Support.SINGLE], limit_to_sole(body, (0.0, body.feet_y[0]), least))
     phases[Support.DOUBLE] = replace_margins(phases[Support.DOUBLE], make_stance_margins(body, feet[0]))

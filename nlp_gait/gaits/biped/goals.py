@@ -41,8 +41,10 @@ class Goal:
             figure = self.figure(samples)
             return figure, {"power_W": compute_paper_power(at, samples, Exact())}, {self.objective.name: figure}
         power = self.power(at, samples, ops)
-        more = {} if self.power is compute_paper_power else {"paper_power_W": compute_paper_power(at, samples, Exact())}
-        return power, {"power_W": power}, more
+        paper = (
+            {} if self.power is compute_paper_power else {"paper_power_W": compute_paper_power(at, samples, Exact())}
+        )
+        return power, {"power_W": power}, paper
 
 
 def _average_squared_rate(values: MX, samples: Samples) -> MX:

@@ -54,8 +54,8 @@ def make_rows(
     size: float = 1.0,
 ) -> Constraint:
     """Make rows with the scale of their unit; ``size`` is that of the robot's quantity relative to NAO's."""
-    own, scale = tuple(labels), size * SCALES[unit]
-    return Constraint(name=name, labels=own, unit=unit, scale=scale, value=value, lower=lower, upper=upper, over=over)
+    names, scale = tuple(labels), size * SCALES[unit]
+    return Constraint(name=name, labels=names, unit=unit, scale=scale, value=value, lower=lower, upper=upper, over=over)
 
 
 def make_rows_at_samples(
@@ -180,7 +180,7 @@ class BalanceMargins(Limit):
         margins = dict(zip("xy", self._margins(samples.zmp, at, ops), strict=True))
         means = {axis: samples.average_margins(margin) for axis, margin in margins.items()}
         names = [str(k) for k in range(n)]
-        each = [
+        least = [
             make_rows(f"dbm_{axis}", "m", margin.T, at[f"dbm_{axis}_min_limit_m"], labels=names, over="instant")
             for axis, margin in margins.items()
         ]
@@ -188,7 +188,7 @@ class BalanceMargins(Limit):
             make_rows(f"dbm_{axis}_mean", "m", value, at[f"dbm_{axis}_mean_limit_m"], over="mean")
             for axis, value in means.items()
         ]
-        return (*each, *mean), {
+        return (*least, *mean), {
             **{f"dbm_{axis}_min_m": ca.mmin(margin) for axis, margin in margins.items()},
             **{f"dbm_{axis}_mean_m": value for axis, value in means.items()},
         }

@@ -57,9 +57,9 @@ class LoadSharing:
         """Return a plan with the load's own part."""
         return plan
 
-    def start(self, names: Sequence[str], others: Start | None) -> Start | None:
-        """Return start points of variables by name from those of the others; None for any within the bounds."""
-        return others
+    def start(self, names: Sequence[str], motion_start: Start | None) -> Start | None:
+        """Return a function that draws start points of variables by name; None: uniform within the bounds."""
+        return motion_start
 
 
 def share_load(body: Body, rule: TorsoShare, degree: int = LOAD_DEGREE) -> LoadSharing:
@@ -107,16 +107,16 @@ class PlannedLoad(LoadSharing):
 
         return plan_with_load
 
-    def start(self, names: Sequence[str], others: Start | None) -> Start:
+    def start(self, names: Sequence[str], motion_start: Start | None) -> Start:
         """Start near a load that passes evenly to the right foot."""
-        own = [variable.name for variable in self.variables]
-        places = [names.index(name) for name in own]
+        coefficients = [variable.name for variable in self.variables]
+        places = [names.index(name) for name in coefficients]
         middle = np.zeros((len(COMPONENTS), self._count))
         middle[list(COMPONENTS).index("force_z"), :-RAMPS] = np.linspace(0.0, self._weight, self._degree + 1)
 
         def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
             lower, upper = (np.array([parameters[f"{name}.{end}"] for name in names]) for end in ("lower", "upper"))
-            x = rng.uniform(lower, upper) if others is None else others(parameters, rng)
+            x = rng.uniform(lower, upper) if motion_start is None else motion_start(parameters, rng)
             width = START_SHARE * (upper - lower)[places] / 2
             x[places] = middle.ravel() + rng.uniform(-width, width)
             return x
@@ -142,11 +142,11 @@ def make_planned_loads(body: Body) -> Loader:
         feet, wrench = {side: ankle[:2] for side, ankle in now.ankles.items()}, now.wrench
         pushes = {right.link: balance.shift_up(wrench, right.ankle_height_m)}
         torques, at_ankle = newton_euler(tree, q, qd, qdd, body.gravity_vector, upright=body.upright, pushes=pushes)
-        own = balance.shift_down(at_ankle, left.ankle_height_m)
+        left_wrench = balance.shift_down(at_ankle, left.ankle_height_m)
         arm = ca.vertcat(feet["R"] - feet["L"], 0)
-        both = own + wrench + ca.vertcat(SX(3, 1), ca.cross(arm, wrench[:3]))
+        both = left_wrench + wrench + ca.vertcat(SX(3, 1), ca.cross(arm, wrench[:3]))
         offset = balance.zmp_of_wrench(Wrench(both[:3], both[3:]), 0.0, body.weight)
-        return now._replace(torques=torques, zmp=feet["L"] + offset, wrenches={"L": own, "R": wrench})
+        return now._replace(torques=torques, zmp=feet["L"] + offset, wrenches={"L": left_wrench, "R": wrench})
 
     return loads
 
@@ -173,11 +173,11 @@ class FootLimits(Limit):
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n, mu = samples.steps + 1, at["friction_coefficient"]
-        found, loads = [], {}
+        rows, loads = [], {}
         for side, foot in BOTH_FEET.items():
             kinds = _make_bearing_function(self._feet[foot]).map(n)(samples.wrench(side), ca.repmat(mu, 1, n))
             for (name, unit, names), values in zip(ROWS, kinds, strict=True):
-                found.append(make_rows_at_samples(f"{foot}_{name}", unit, values, names, MX(0.0)))
+                rows.append(make_rows_at_samples(f"{foot}_{name}", unit, values, names, MX(0.0)))
             loads[foot] = samples.wrench(side)[2, :] / self._weight
         # The right foot's load is known with its slope, the left one has the rest of a total that changes slowly.
         right = samples.read("load_slope") / (samples.step_s * samples.steps * self._weight)
@@ -188,7 +188,7 @@ class FootLimits(Limit):
         ends = ca.vertcat(loads["right"][0], loads["left"][-1])
         feet = ("right, landed", "left, lifting")
         return (
-            *found,
+            *rows,
             make_rows("load_rate", "1/s", ca.vec(ca.vertcat(*rates.values())), -limit, limit, names, "samples"),
             make_rows("switch_load", "1", ends, None, at["switch_load_limit"], feet, over="once"),
         ), {"load_rate_1_s": ca.mmax(ca.fabs(ca.vertcat(*rates.values()))), "switch_load": ca.mmax(ends)}

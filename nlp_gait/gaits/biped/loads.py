@@ -121,13 +121,13 @@ def make_divided_loads(body: Body, rule: Division) -> Loader:
         for side, name in BOTH_FEET.items():
             foot = robot.feet[name]
             half = Chain(foot.link, body.leg_joints[side], {robot.root: shares[side]})
-            own, wrench = compute_torques(body, half, now.joints)
+            of_half, wrench = compute_torques(body, half, now.joints)
             acting = find_zmp_wrench(body, half, now.joints, wrench)
             height = foot.ankle_height_m
             if side == "R" and now.yaw.shape[0]:  # from the axes of its foot
                 wrench, acting = (Wrench(*(axis_rotation(UP, now.yaw) @ part for part in w)) for w in (wrench, acting))
             wrenches[side] = balance.shift_down(wrench, height)
-            torques |= own
+            torques |= of_half
             zmps.append(now.ankles[side][:2] + balance.zmp_of_wrench(acting, height, weight))
             ground_loads.append(balance.ground_load(acting, weight))
         return now._replace(torques=torques, zmp=balance.combine_zmps(zmps, ground_loads), wrenches=wrenches)

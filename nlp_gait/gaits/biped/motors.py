@@ -63,10 +63,10 @@ class Motors:
 
     def __post_init__(self) -> None:
         """Check the features."""
-        known = [name for name in FEATURES if name != ANKLE or self.coupling is not None]
+        features = [name for name in FEATURES if name != ANKLE or self.coupling is not None]
         for name in self.features:
-            if name not in known:
-                raise unknown("feature in motors", name, known)
+            if name not in features:
+                raise unknown("feature in motors", name, features)
         if {"free-braking", "regeneration"} <= set(self.features):
             raise InputError("motors: braking either draws nothing (free-braking) or gives power back (regeneration)")
         if self.features:
@@ -77,14 +77,14 @@ class Motors:
         """The robot of the dynamics, with the inertia of its rotors if that is a feature."""
         if "rotor" not in self.features:
             return self.robot
-        found = {}
+        inertias = {}
         for joint, rating in zip(self.joints, self._ratings, strict=True):
             if rating.reflected_inertia_kgm2 is None:
                 raise InputError(
                     f"robot {self.robot.name!r}: the motor of joint {joint!r} has no rotor_inertia_gcm2, which motors=rotor needs"
                 )
-            found[joint] = rating.reflected_inertia_kgm2 / (len(self.shared) if joint in self.shared else 1)
-        return replace(self.robot, armatures_kgm2=found)
+            inertias[joint] = rating.reflected_inertia_kgm2 / (len(self.shared) if joint in self.shared else 1)
+        return replace(self.robot, armatures_kgm2=inertias)
 
     @property
     def limits(self) -> tuple[Limit, ...]:

@@ -109,7 +109,7 @@ class Phase:
         samples = self.sample(at, ops) if samples is None else samples
         added = [limit.add(at, samples, ops) for limit in self.every_limit]
         value, before, after = self.goal.evaluate(at, samples, ops)
-        indexes = {name: index for _, own in added for name, index in own.items()}
+        indexes = {name: index for _, limit_indexes in added for name, index in limit_indexes.items()}
         return Assembly(
             objective=value,
             constraints=tuple(row for rows, _ in added for row in rows),
@@ -256,15 +256,15 @@ class Phase:
             return self._map(ca.Function("sample", inputs, simplify(outputs)), ats, phases=phases)
         (start,) = self._map(ca.Function("start", inputs, simplify([roots.start])), ats, phases=phases)
         tied = ca.Function("sample", [roots.unknowns, *inputs], simplify([roots.residual, *outputs]))
-        found: list[Any] = []
+        columns: list[Any] = []
 
         def residual(unknowns: MX) -> MX:
-            rows, *rest = self._map(tied, ats, unknowns, phases=phases)
-            found.extend(rest)
+            rows, *quantities = self._map(tied, ats, unknowns, phases=phases)
+            columns.extend(quantities)
             return rows
 
         ops.tie_roots(start, residual)
-        return found
+        return columns
 
     def _instant_outputs(self, ops: Nonsmooth) -> tuple[list[SX], list[SX]]:
         """Return x, margin and phase of one instant, and its outputs for ``sample``, with analytic derivatives."""
@@ -293,15 +293,15 @@ class Phase:
 
     def _evaluate_stages(self, stages: "Stages", at: NumericPoint) -> dict[str, MX]:
         """Evaluate quantities at all samples, by their names; derivatives may be finite differences."""
-        q, qd, qdd, world, *others = self._map(stages.motion, [at])
+        q, qd, qdd, world, *of_motion = self._map(stages.motion, [at])
         if self.derivatives != "analytic":
             qd, qdd = self._differences(q, at)
         rows = [self.body.joints.index(name) for name in self.moving]
         loads = stages.loads.map(self.grid.parts + 1)(q[rows, :], qd[rows, :], qdd[rows, :], world)
-        found = dict(zip(stages.of_motion, others, strict=True))
-        found |= dict(zip(stages.of_loads, loads if isinstance(loads, tuple) else [loads], strict=True))
-        found |= {"all_q": q, "all_qd": qd, "all_qdd": qdd}  # see ``ALL_JOINTS``
-        return {name: found[name] for name in stages.names}
+        values = dict(zip(stages.of_motion, of_motion, strict=True))
+        values |= dict(zip(stages.of_loads, loads if isinstance(loads, tuple) else [loads], strict=True))
+        values |= {"all_q": q, "all_qd": qd, "all_qdd": qdd}  # see ``ALL_JOINTS``
+        return {name: values[name] for name in stages.names}
 
     def _evaluate_histories(self, at: NumericPoint) -> dict[str, MX]:
         return self._evaluate_stages(self._history_stages, at)

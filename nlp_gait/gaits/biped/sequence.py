@@ -175,10 +175,10 @@ class Sequence:
 
 def join_phases(phases: Iterable[Signals]) -> Signals:
     """Join phases that begin at time zero; of both samples at a switch, equal without an impact, the earlier one is kept."""
-    first, *others = phases
+    first, *later = phases
     arrays = {name: [array] for name, array in first.arrays.items()}
-    for other in others:
+    for phase in later:
         begin = arrays["t"][-1][-1]
-        for name, array in other.arrays.items():
+        for name, array in phase.arrays.items():
             arrays[name].append((begin + array if name == "t" else array)[1:])
     return replace(first, arrays={name: np.concatenate(parts) for name, parts in arrays.items()})

@@ -71,9 +71,9 @@ def place_links(robot: Robot, angles: Mapping[str, SX], left_ankle: SX) -> dict[
     poses = forward_kinematics(tree, dict.fromkeys(robot.joints, SX(0)) | dict(angles), left_ankle)
     for body, pose in zip(tree, poses, strict=True):
         # A body's reference point is the joint by which it is reached; its own joint is elsewhere where that leads up.
-        own = robot.joint_to.get(body.link.name)
+        joint = robot.joint_to.get(body.link.name)
         upwards = body.joint is not None and body.direction < 0
-        offset = np.array(body.com_offset_m) - np.array(body.link.com_m) if upwards or own is None else np.zeros(3)
+        offset = np.array(body.com_offset_m) - np.array(body.link.com_m) if upwards or joint is None else np.zeros(3)
         places[body.link.name] = pose.position + pose.rotation @ ca.DM(offset)
         places[f"{body.link.name} tip"] = pose.com
     return places
@@ -86,8 +86,8 @@ def locate_links(robot: Robot, signals: Signals) -> dict[str, Array]:
     function = ca.Function("places", [q, base], list(places.values()))
     standing = signals.arrays["left_foot"] + np.array([0.0, 0.0, robot.feet[LEFT].ankle_height_m])
     values = function.map(len(signals.arrays["t"]))(signals.arrays["q"].T, standing.T)
-    found = {name: np.array(value.full().T) for name, value in zip(places, values, strict=True)}
+    positions = {name: np.array(value.full().T) for name, value in zip(places, values, strict=True)}
     if "feet_yaw" not in signals.arrays:
-        return found
+        return positions
     yaw = signals.arrays["feet_yaw"][:, 0]
-    return {name: standing + turn_about_vertical(place - standing, yaw) for name, place in found.items()}
+    return {name: standing + turn_about_vertical(place - standing, yaw) for name, place in positions.items()}

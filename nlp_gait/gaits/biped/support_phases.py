@@ -116,11 +116,11 @@ def make_support_phase(
     sharing = sharing or LoadSharing(make_single_support_loads(body))
     splines = body.make_splines(name, trajectory)
 
-    def swing(at: InstantPoint, more: Mapping[str, Motion], height: float, s: SX) -> Motion:
+    def swing(at: InstantPoint, curves_added: Mapping[str, Motion], height: float, s: SX) -> Motion:
         """The paper's motion of the right foot at a height, and what its curves add."""
         time, (begin, end) = read_duration(at, name), stance.swing_x
         paper = swing_foot(SX(begin), SX(end), stance.swing_y, height, at[LIFT], time, s)
-        curves = (more["foot_x"], trajectories.constant_motion(0.0), more["foot_z"])
+        curves = (curves_added["foot_x"], trajectories.constant_motion(0.0), curves_added["foot_z"])
         return trajectories.add_motions(paper, trajectories.stack(*curves))
 
     def sole(at: InstantPoint, s: SX) -> SX:
@@ -128,17 +128,17 @@ def make_support_phase(
 
     def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
         time = read_duration(at, name)
-        more = splines.motions(at, time, s)
-        hip, angles = move_hip(at, more, *hip_places, time, s), body.angles(name, at, more, time, s)
-        ankles = {**standing, "R": swing(at, more, body.ankle("R")[1], s)} if swings else standing
+        curves = splines.motions(at, time, s)
+        hip, angles = move_hip(at, curves, *hip_places, time, s), body.angles(name, at, curves, time, s)
+        ankles = {**standing, "R": swing(at, curves, body.ankle("R")[1], s)} if swings else standing
         return body.plan(hip, angles, ankles, at[REACH_MARGIN], ops)
 
     balance = limit_to_sole(body, stance.support_xy) if swings else limit_to_box(make_support_box(body.robot, soles))
     clearance = (SplineClearance(sole, step_m, LIFT),) if swings and splines.count else ()
     curve_limits = body.make_curve_limits(name, splines.count)
     lift = (make_lift_variable(body),) if swings else ()
-    own = (*lift, make_time_variable(body, name), *splines.variables, *sharing.variables)
-    variables = (*make_hip_variables(body), *body.angle_variables, *own)
+    last = (*lift, make_time_variable(body, name), *splines.variables, *sharing.variables)
+    variables = (*make_hip_variables(body), *body.angle_variables, *last)
     names = [variable.name for variable in variables]
     return Phase(
         body=body,

@@ -196,11 +196,11 @@ def make_walk_phases(
             plan=planners[kind is Support.SINGLE],
             loads=make_single_support_loads(body) if kind is Support.SINGLE else loads,
             grid=grid,
-            limits=(*make_phase_limits(body, own), *body.motors.limits),
+            limits=(*make_phase_limits(body, balance), *body.motors.limits),
             goal=goal,
             standing=kind.standing,
         )
-        for kind, own in {
+        for kind, balance in {
             Support.SINGLE: margins[Support.SINGLE],
             Support.DOUBLE: margins[Support.DOUBLE],
             Support.STAND: limit_to_box(box),

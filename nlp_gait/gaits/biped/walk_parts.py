@@ -37,8 +37,8 @@ class State(NamedTuple):
 
     def find_alike(self, body: Body) -> dict[str, str]:
         """Return the cycle's variable for each of the state's."""
-        own, cycle = self.make_variables(body), make_state_variables(body, self.switch, self.switch)
-        return {variable.name: like.name for variable, like in zip(own, cycle, strict=True)}
+        variables, cycle = self.make_variables(body), make_state_variables(body, self.switch, self.switch)
+        return {variable.name: like.name for variable, like in zip(variables, cycle, strict=True)}
 
 
 STATES = (
@@ -84,19 +84,21 @@ def make_phase_variables(body: Body) -> tuple[Variable, ...]:
 def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
     """Return the variables of the cycle and of both ends of the walk; without inner steps, few of the cycle's remain."""
     cycle = make_cycle_variables(body)
-    own = {variable.name: variable for variable in cycle}
+    by_name = {variable.name: variable for variable in cycle}
     inner = {LIFT, *TIMES.values(), *(v.name for v in STATES[1].make_variables(body))}
-    found = [variable for variable in cycle if steps > HALF_STEPS or variable.name not in inner]
+    variables = [variable for variable in cycle if steps > HALF_STEPS or variable.name not in inner]
     for state in STATES[len(SWITCHES) :]:
-        found += state.make_variables(body)
-    found += make_pose_variables(body)
+        variables += state.make_variables(body)
+    variables += make_pose_variables(body)
     for part in (*START[1:], *STOP):
         kind = Support.SINGLE if part.kind is Support.SINGLE else Support.DOUBLE
-        found.append(replace(own[TIMES[kind]], name=part.duration, description=f"duration of the phase {part.name}"))
+        variables.append(
+            replace(by_name[TIMES[kind]], name=part.duration, description=f"duration of the phase {part.name}")
+        )
         if kind is Support.SINGLE:
             words = f"{make_lift_variable(body).description}, phase {part.name}"
-            found.append(replace(make_lift_variable(body), name=part.lift, description=words))
-    return tuple(found)
+            variables.append(replace(make_lift_variable(body), name=part.lift, description=words))
+    return tuple(variables)
 
 
 def make_pose_variables(body: Body) -> list[Variable]:
@@ -169,11 +171,11 @@ def start_from_cycle(walk: GaitProblem, start: Array, cycle: Mapping[str, float]
     rule = walk.hints.start
     assert isinstance(rule, WalkStart)
     alike = {**rule.alike, **rule.pose}
-    found = {name: cycle.get(alike.get(name, name), value) for name, value in walk.by_name(start).items()}
+    values = {name: cycle.get(alike.get(name, name), value) for name, value in walk.by_name(start).items()}
     # A lift-off between both feet is ahead of one side by side.
-    first = next(name for name in found if name in ("hip_x_start_lift_off_m", "hip_x_step1_lift_off_m"))
-    found |= dict.fromkeys((f"hip_x_{STAND}_m", first), 0.2 * (found | dict(cycle))[STEP])
+    first = next(name for name in values if name in ("hip_x_start_lift_off_m", "hip_x_step1_lift_off_m"))
+    values |= dict.fromkeys((f"hip_x_{STAND}_m", first), 0.2 * (values | dict(cycle))[STEP])
     for state, share in {"lift_off": -0.5, "touch_down": 0.5, "start_touch_down": 0.5}.items():
-        if (name := f"hip_z_{state}_m") in found:
-            found[name] += share * rise_m
-    return np.asarray(np.clip(list(found.values()), walk.lower, walk.upper))
+        if (name := f"hip_z_{state}_m") in values:
+            values[name] += share * rise_m
+    return np.asarray(np.clip(list(values.values()), walk.lower, walk.upper))

@@ -83,10 +83,10 @@ class Humanoid(Body):
             if TORSO_YAW in angles:
                 foot = angles[RIGHT_YAW] if letter == "R" else constant_motion(0.0)
                 torso = general_leg.turn_torso(torso, angles[TORSO_YAW], foot)
-            found = general_leg.leg_motion(leg, self.newton_steps[name], torso, margin, ops, held=ops.exact)
-            joints |= {joint: Motion(*(part[i] for part in found.joints)) for i, joint in enumerate(leg.joints)}
-            reach.append(found.reach)
-            miss.append(found.miss)
+            motion = general_leg.leg_motion(leg, self.newton_steps[name], torso, margin, ops, held=ops.exact)
+            joints |= {joint: Motion(*(part[i] for part in motion.joints)) for i, joint in enumerate(leg.joints)}
+            reach.append(motion.reach)
+            miss.append(motion.miss)
         half_roll, half_pitch = roll.position / 2, pitch.position / 2
         attitude = [
             ca.cos(half_pitch) * ca.cos(half_roll),

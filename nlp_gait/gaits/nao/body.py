@@ -108,15 +108,15 @@ class AnkleCoupling(Limit):
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         angles: Mapping[str, MX] = dict(zip(samples.moving, vertsplit(samples.q), strict=True))
         names = [str(k) for k in range(samples.steps + 1)]
-        found = []
+        rows = []
         for side, sign, columns in (("L", 1.0, (1, 2)), ("R", -1.0, (2, 1))):
             pitch, roll = (angles[f"{side}{joint}"].T for joint in ("AnklePitch", "AnkleRoll"))
             least, greatest = (sign * limit_ankle_roll(pitch, column) for column in columns)
-            found += [
+            rows += [
                 make_rows(f"{side}AnkleRoll_least", "rad", roll - least, MX(0.0), None, names, "instant"),
                 make_rows(f"{side}AnkleRoll_greatest", "rad", roll - greatest, None, MX(0.0), names, "instant"),
             ]
-        return found, {}
+        return rows, {}
 
 
 def limit_ankle_roll(pitch: MX, column: int) -> MX:

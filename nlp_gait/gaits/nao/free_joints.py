@@ -124,10 +124,10 @@ def make_free_single_support_phase(body: NaoBody, step_m: float, trajectory: Tra
 
 def fit_joints(trajectory: Trajectory, planned: GaitProblem, x: Array) -> Array:
     """Return the point (n,) of free joints whose motion is nearest to a motion x of ``nao_ssp`` with the same robot and step."""
-    own = x[: sum("[" not in name for name in planned.names)]
+    planned_x = x[: sum("[" not in name for name in planned.names)]
     spans = SPANS[trajectory]
     if spans == 0:
-        return own
+        return planned_x
     dense = planned.dense(FIT_FACTOR)
     assert dense is not None  # a phase has one; for the type checker
     signals = dense.signals(x)
@@ -138,4 +138,4 @@ def fit_joints(trajectory: Trajectory, planned: GaitProblem, x: Array) -> Array:
     straight = np.array(hermite.map(len(phases))(DM(phases).T).full())
     columns = dict(zip(signals.joints, fit_spline(q - straight.T, spans, phases).T, strict=True))
     columns[YAW_PITCH] = np.mean([columns[name] for name in YAW_PITCHES], axis=0)
-    return np.concatenate([own, *(columns[curve] for curve in CURVES)])
+    return np.concatenate([planned_x, *(columns[curve] for curve in CURVES)])

@@ -36,8 +36,8 @@ class LeaningNao(NaoBody):
     def angle_names(self, phase: Support) -> tuple[str, ...]:
         return (*super().angle_names(phase), *LEAN)
 
-    def angles(self, phase: Support, at: InstantPoint, more: Angles, duration: SX, s: SX) -> Angles:
-        return {**super().angles(phase, at, more, duration, s), **{name: more[name] for name in LEAN}}
+    def angles(self, phase: Support, at: InstantPoint, splines: Angles, duration: SX, s: SX) -> Angles:
+        return {**super().angles(phase, at, splines, duration, s), **{name: splines[name] for name in LEAN}}
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
         places = {side: ankle.position for side, ankle in ankles.items()}
@@ -132,13 +132,13 @@ def _select_rows(motion: Motion, rows: slice) -> Motion:
 def _place_hips(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
     """(11,) of a pose (5,): yaw-pitch, and by side the hip (3,) [m], its roll, and its pitch beyond upright [rad]."""
     turn = _solve_turn(robot, pose, ankles)
-    found = [turn[1]]
+    rows = [turn[1]]
     for side in "LR":
         hip, rotation = _place_hip(robot, side, turn, pose)
         plane = _compute_plane(hip, ankles[side])
-        rest = rotation.T @ axis_rotation(FORWARD, plane)  # roll about x, then the pitch about y
-        found += [hip, ca.atan2(rest[2, 1], rest[1, 1]), ca.atan2(rest[0, 2], rest[0, 0])]
-    return ca.vertcat(*found)
+        at_roll = rotation.T @ axis_rotation(FORWARD, plane)  # roll about x, then the pitch about y
+        rows += [hip, ca.atan2(at_roll[2, 1], at_roll[1, 1]), ca.atan2(at_roll[0, 2], at_roll[0, 0])]
+    return ca.vertcat(*rows)
 
 
 def _solve_turn(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
@@ -147,10 +147,10 @@ def _solve_turn(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
     misfits = ca.vertcat(*(_compute_misfit(robot, side, turn, at, ankles[side]) for side in "LR"))
     slope = ca.jacobian(misfits, turn)
     step = ca.Function("step", [turn, at], [turn - ca.inv_minor(slope) @ misfits])
-    found = SX(2, 1)
+    solution = SX(2, 1)
     for _ in range(NEWTON_STEPS):
-        found = step(found, pose)
-    return found
+        solution = step(solution, pose)
+    return solution
 
 
 def _compute_misfit(robot: Robot, side: str, turn: SX, pose: SX, ankle: SX) -> SX:

@@ -181,7 +181,7 @@ def make_recorded_phase(
 ) -> RecordedPhase:
     """Return a phase that a motion shows, with the limits of planned ones, balance and others."""
     body = motion.body
-    balance, *others = limits
+    balance, *limits_besides = limits
     freed = replace(body, upright=frozenset())
     return RecordedPhase(
         body=body,
@@ -189,7 +189,7 @@ def make_recorded_phase(
         duration=TIMES[kind],
         loads=make_single_support_loads(freed) if kind is Support.SINGLE else make_divided_loads(freed, rule),
         grid=grid,
-        limits=(*make_phase_limits(body, balance), *others),
+        limits=(*make_phase_limits(body, balance), *limits_besides),
         goal=Goal(heat=body.heat),
         standing=kind.standing,
         support=body.support,
@@ -222,12 +222,12 @@ def make_recorded_cycle_problem(motions: Mapping[Support, RecordedMotion], repea
     """Return the problem of both phases of a motion and the rows that join them; if it repeats, another step can follow."""
     body = motions[Support.SINGLE].body
     margins = make_cycle_margins(body)
-    known = {variable.name: variable for variable in make_cycle_variables(body)}
-    variables = (known[TIMES[Support.SINGLE]], known[TIMES[Support.DOUBLE]], known[STEP])
-    places = [{axis: known[f"hip_{axis}_{switch}_m"] for axis in "xz"} for switch in SWITCHES]
-    rates = [{f"v{axis}": known[f"hip_v{axis}_{switch}_m_s"] for axis in "xyz"} for switch in SWITCHES]
+    planned = {variable.name: variable for variable in make_cycle_variables(body)}
+    variables = (planned[TIMES[Support.SINGLE]], planned[TIMES[Support.DOUBLE]], planned[STEP])
+    places = [{axis: planned[f"hip_{axis}_{switch}_m"] for axis in "xz"} for switch in SWITCHES]
+    rates = [{f"v{axis}": planned[f"hip_v{axis}_{switch}_m_s"] for axis in "xyz"} for switch in SWITCHES]
     hip = HipLimits([place | rate for place, rate in zip(places, rates, strict=True)], SWITCHES)
-    single = (margins[Support.SINGLE], hip, SwingLimits(motions[Support.SINGLE], known[LIFT]))
+    single = (margins[Support.SINGLE], hip, SwingLimits(motions[Support.SINGLE], planned[LIFT]))
     double = (margins[Support.DOUBLE], StandingLimits())
     phases = {
         kind: make_recorded_phase(motions[kind], kind, variables, grid, "lever", limits)

@@ -154,18 +154,18 @@ def make_double_support(
 
     def instant(z: SX, phase: float) -> PowerInstant:
         hip, arms = _move_hip(z, *hip_ends, phase), move_arms(arm_swing, ONE, SX(phase))
-        found = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
+        sample = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
         shares = share_torso(hip.position[1], rule, feet_y)
-        torso = found.link_wrench(robot.root, world_frame.make_upright_frame(hip))
+        torso = sample.link_wrench(robot.root, world_frame.make_upright_frame(hip))
         moments, loads = [], []
         for side, foot in (("L", robot.feet["left"]), ("R", robot.feet["right"])):
-            upper = found.add_arm(side, arms, hip.acceleration) + shares[side] * torso
-            ground = found.add_stance_leg(side, hip, Motion(ankles[side], SX(3, 1), SX(3, 1)), upper)
+            upper = sample.add_arm(side, arms, hip.acceleration) + shares[side] * torso
+            ground = sample.add_stance_leg(side, hip, Motion(ankles[side], SX(3, 1), SX(3, 1)), upper)
             load = ground_load(ground, weight)
             moments.append(ankles[side][:2] * load + _tilt(ground, foot.ankle_height_m))
             loads.append(load)
-        found.zmp = sum(moments, SX(2, 1)) / sum(loads, SX(0))
-        return found
+        sample.zmp = sum(moments, SX(2, 1)) / sum(loads, SX(0))
+        return sample
 
     box = make_support_box(robot, soles)
     sides = ((box.back, box.front), (box.right, box.left))
@@ -185,16 +185,16 @@ def make_single_support(robot: Robot, stance: Stance, arm_swing: Mapping[str, Po
     def instant(z: SX, phase: float) -> PowerInstant:
         hip = _move_hip(z, stance.hip_x, stance.hip_y, phase)
         arms = move_arms(arm_swing, ONE, SX(phase))
-        found = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
+        sample = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
         begin, end = (SX(x) for x in stance.swing_x)
         path = swing_foot(begin, end, stance.swing_y, robot.feet["right"].ankle_height_m, z[-2], ONE, SX(phase))
-        upper = found.link_wrench(robot.root, world_frame.make_upright_frame(hip))
+        upper = sample.link_wrench(robot.root, world_frame.make_upright_frame(hip))
         for side in "LR":
-            upper = upper + found.add_arm(side, arms, hip.acceleration)
-        upper = upper + found.add_swing_leg("R", hip, path)
-        ground = found.add_stance_leg("L", hip, Motion(support, SX(3, 1), SX(3, 1)), upper)
-        found.zmp = support[:2] + _tilt(ground, foot.ankle_height_m) / ground_load(ground, weight)
-        return found
+            upper = upper + sample.add_arm(side, arms, hip.acceleration)
+        upper = upper + sample.add_swing_leg("R", hip, path)
+        ground = sample.add_stance_leg("L", hip, Motion(support, SX(3, 1), SX(3, 1)), upper)
+        sample.zmp = support[:2] + _tilt(ground, foot.ankle_height_m) / ground_load(ground, weight)
+        return sample
 
     x, y = stance.support_xy
     sides = ((x - foot.back_m, x + foot.front_m), (y - foot.right_m, y + foot.left_m))

@@ -76,12 +76,12 @@ def make_chain_frames(joints: Sequence[Joint], angles: Mapping[str, Motion], bas
     names = [joint.name for joint in joints]
 
     def columns(q: SX) -> SX:
-        rotation, position, found = SX.eye(3), SX(3, 1), []
+        rotation, position, frames = SX.eye(3), SX(3, 1), []
         for i, joint in enumerate(joints):
             position = position + rotation @ DM(joint.origin_m)
             rotation = rotation @ axis_rotation(joint.axis, q[i])
-            found.append(ca.horzcat(rotation, position))
-        return ca.horzcat(*found)
+            frames.append(ca.horzcat(rotation, position))
+        return ca.horzcat(*frames)
 
     moved = map_motion(columns, Motion(*(ca.vertcat(*(angles[name][order] for name in names)) for order in range(3))))
     frames = {}
