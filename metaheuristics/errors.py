@@ -9,7 +9,9 @@ class SearchError(Exception):
     """
 
     def __init__(self, *arguments: object) -> None:
-        super().__init__(*(" ".join(part.splitlines()) if isinstance(part, str) else part for part in arguments))
+        super().__init__(
+            *(" ".join(argument.splitlines()) if isinstance(argument, str) else argument for argument in arguments)
+        )
 
 
 LONGEST_VALUE = 80  # characters of a value in a message

@@ -85,10 +85,10 @@ class Evaluator:
         self.evaluations += len(X)
         self.failed += int(np.count_nonzero(failed))
         leader = interface.FEASIBILITY.best(f, violation)
-        found = (float(violation[leader]), float(f[leader]))
+        best = (float(violation[leader]), float(f[leader]))
         self.stagnation += 1
-        if found < self.best or not self._history:
-            self.best, self.best_x, self.stagnation = found, X[leader].copy(), 0
+        if best < self.best or not self._history:
+            self.best, self.best_x, self.stagnation = best, X[leader].copy(), 0
         self.generations += 1
         if self._thinned and self.stagnation > 1:
             self._history.pop()

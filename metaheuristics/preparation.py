@@ -39,7 +39,7 @@ def prepare_start(
 
 def read_bounds(objective: Bounded) -> tuple[Array, Array]:
     """Return read-only copies of the lower and upper bounds (n,); SearchError unless they are finite and not inverted."""
-    if not callable(objective) or not all(hasattr(objective, part) for part in ("names", "lower", "upper")):
+    if not callable(objective) or not all(hasattr(objective, name) for name in ("names", "lower", "upper")):
         raise SearchError(f"objective must be a function of X with names, lower and upper, got {abbreviate(objective)}")
     try:
         names = tuple(objective.names)
@@ -128,7 +128,7 @@ def check_population(algorithm: Algorithm, name: str = "") -> None:
 
 def check_search(search: object, algorithm: Algorithm) -> None:
     """Raise SearchError unless a search has `ask`, `tell` and `stop`."""
-    missing = [part for part in ("ask", "tell", "stop") if not callable(getattr(search, part, None))]
+    missing = [name for name in ("ask", "tell", "stop") if not callable(getattr(search, name, None))]
     if missing:
         raise SearchError(
             f"algorithm {name_of(algorithm)!r}: start must return a search with {', '.join(missing)}, got {abbreviate(search)}"

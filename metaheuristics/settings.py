@@ -40,9 +40,9 @@ def list_ranges(settings: object) -> dict[str, Range]:
         SearchError: a range is neither two finite numbers, ascending, nor texts.
     """
     known = fields(settings) if is_dataclass(settings) and not isinstance(settings, type) else ()
-    found = {entry.name: entry.metadata[RANGE] for entry in known if RANGE in entry.metadata}
-    found |= getattr(settings, "ranges", {})
-    for name, within in found.items():
+    ranges = {entry.name: entry.metadata[RANGE] for entry in known if RANGE in entry.metadata}
+    ranges |= getattr(settings, "ranges", {})
+    for name, within in ranges.items():
         low, high, *scale = within if len(within) > 1 else (math.nan, math.nan)
         if all(isinstance(value, str) for value in within) and len(within) > 1:
             continue
@@ -50,7 +50,7 @@ def list_ranges(settings: object) -> dict[str, Range]:
             raise SearchError(f"the range of {name!r} must be (least, greatest) or texts, got {abbreviate(within)}")
         if scale not in ([], ["log"]) or (scale and low <= 0):
             raise SearchError(f'the range of {name!r} may end with "log" if it is above 0, got {abbreviate(within)}')
-    return found
+    return ranges
 
 
 def is_number(value: object, kind: type = Real) -> bool:

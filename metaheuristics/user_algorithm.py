@@ -54,8 +54,8 @@ def to_algorithm(user: Any, name: str, settings: Mapping[str, Any] | None = None
             f"got {type(algorithm).__name__}"
         )
     check_population(algorithm, name)
-    made: Algorithm = algorithm
-    return made
+    instance: Algorithm = algorithm
+    return instance
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -64,21 +64,21 @@ def read_table(path: Path, what: str) -> CsvTable:
     first = text.partition("\n")[0]
     delimiter = max(DELIMITERS, key=first.count)
     lines = enumerate(csv.reader(text.splitlines(), delimiter=delimiter), start=1)
-    found = [(number, [cell.strip() for cell in row]) for number, row in lines if any(cell.strip() for cell in row)]
+    filled = [(number, [cell.strip() for cell in row]) for number, row in lines if any(cell.strip() for cell in row)]
     header: tuple[str, ...] = ()
-    if found and not all(is_numeric_text(cell) for cell in found[0][1] if cell):
-        header = tuple(found.pop(0)[1])
+    if filled and not all(is_numeric_text(cell) for cell in filled[0][1] if cell):
+        header = tuple(filled.pop(0)[1])
         if len(set(header)) < len(header):
             raise InputError(f"{owner}: two columns have the same name")
-    if not found:
+    if not filled:
         raise InputError(f"{owner} has no rows of numbers")
-    width = len(header) or len(found[0][1])
+    width = len(header) or len(filled[0][1])
     rows = []
-    for number, row in found:
+    for number, row in filled:
         if len(row) != width:
             raise InputError(f"{owner}, line {number}: {len(row)} cells, but {width} columns")
         for cell in row:
             if cell and not is_numeric_text(cell):
                 raise InputError(f"{owner}, line {number}: expected a number, got {cell[:40]!r}")
         rows.append(tuple(float(cell) if cell else math.nan for cell in row))
-    return CsvTable(owner=owner, header=header, rows=tuple(rows), lines=tuple(number for number, _ in found))
+    return CsvTable(owner=owner, header=header, rows=tuple(rows), lines=tuple(number for number, _ in filled))

@@ -77,7 +77,7 @@ def decode_value(kind: Any, raw: Any, where: str) -> Any:
         return decode(kind, raw, where)
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Literal:
-        if not any(raw == part and type(raw) is type(part) for part in parts):
+        if not any(raw == choice and type(raw) is type(choice) for choice in parts):
             raise ValueError(f"{where} must be {' or '.join(map(repr, parts))}, got {format_value(raw)}")
         return raw
     if origin is tuple:
@@ -101,12 +101,12 @@ def decode_value(kind: Any, raw: Any, where: str) -> Any:
 def _decode_union(parts: tuple[Any, ...], raw: Any, where: str) -> Any:
     if type(raw) in parts:
         return raw
-    others = [part for part in parts if part is not NoneType]
-    if all(part in WORDS for part in parts) and not (float in parts and type(raw) in (int, NoneType)):
-        raise ValueError(f"{where} must be {' or '.join(WORDS[part] for part in parts)}, got {format_value(raw)}")
-    for part in others[:-1]:
+    others = [choice for choice in parts if choice is not NoneType]
+    if all(choice in WORDS for choice in parts) and not (float in parts and type(raw) in (int, NoneType)):
+        raise ValueError(f"{where} must be {' or '.join(WORDS[choice] for choice in parts)}, got {format_value(raw)}")
+    for choice in others[:-1]:
         try:
-            return decode_value(part, raw, where)
+            return decode_value(choice, raw, where)
         except ValueError:
             continue
     return decode_value(others[-1], raw, where)

@@ -20,7 +20,9 @@ class GaitError(Exception):
     """Base class of all errors that this package raises on purpose; the message is one line, whatever the values in it."""
 
     def __init__(self, *arguments: object) -> None:
-        super().__init__(*(" ".join(part.splitlines()) if isinstance(part, str) else part for part in arguments))
+        super().__init__(
+            *(" ".join(argument.splitlines()) if isinstance(argument, str) else argument for argument in arguments)
+        )
 
 
 class UnknownNameError(GaitError):

@@ -276,12 +276,12 @@ def convert_errors(owner: str, error: type[GaitError], remedy: str = "") -> Iter
 
 
 def _reject_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) != len(pairs):
+    table = dict(pairs)
+    if len(table) != len(pairs):
         keys = [key for key, _ in pairs]
         duplicate = next(key for key in keys if keys.count(key) > 1)
         raise ValueError(f"the key {duplicate[:SHOWN]!r} is duplicated")
-    return found
+    return table
 
 
 def _check_leaf(where: str, value: Any) -> None:

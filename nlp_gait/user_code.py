@@ -81,7 +81,7 @@ def is_program(text: str) -> bool:
 def is_reference(text: str) -> bool:
     """Return whether a text has the form ``file.py:name``, ``module:name`` or ``cmd:COMMAND``."""
     home, colon, name = text.rpartition(":")
-    is_module = all(part.isidentifier() for part in home.split("."))
+    is_module = all(word.isidentifier() for word in home.split("."))
     return is_program(text) or (bool(colon) and name.isidentifier() and (home.endswith(ENDING) or is_module))
 
 
@@ -154,8 +154,8 @@ def _find_program_file(text: str) -> str:
 
 
 def _find_own_word(words: Sequence[str]) -> str | None:
-    own = (word for word in words if os.path.isfile(word) and not (word == words[0] and os.path.isabs(word)))
-    return next(own, None)
+    programs = (word for word in words if os.path.isfile(word) and not (word == words[0] and os.path.isabs(word)))
+    return next(programs, None)
 
 
 def pack_code(text: str, kind: Kind) -> PackedCode | None:

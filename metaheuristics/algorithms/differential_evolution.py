@@ -168,13 +168,13 @@ def compute_gains(before: tuple[Array, Array], after: tuple[Array, Array]) -> Ar
     That is the fall of the violation, or where it is equal of the objective, each kind in units of its greatest one.
     """
     decided = after[0] < before[0]
-    found = np.zeros(len(decided))
+    weights = np.zeros(len(decided))
     for chosen, key in ((decided, 0), (~decided, 1)):
         fall = before[key][chosen] - after[key][chosen]
         fall = np.where(np.isfinite(fall), fall, np.max(fall, initial=0.0, where=np.isfinite(fall)))
         largest = fall.max(initial=0.0)
-        found[chosen] = fall / largest if largest > 0.0 else 1.0
-    return found
+        weights[chosen] = fall / largest if largest > 0.0 else 1.0
+    return weights
 
 
 class _LShadeSearch(PopulationSearch[LShade]):
@@ -257,9 +257,9 @@ def _draw_weights(centres: Array, rng: np.random.Generator) -> Array:
 
 def _draw_two_others(count: int, all: int, rng: np.random.Generator) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """For each of some members another one, and one more of all that are known; the three differ."""
-    own = np.arange(count)
-    first = (own + 1 + rng.integers(count - 1, size=count)) % count
+    targets = np.arange(count)
+    first = (targets + 1 + rng.integers(count - 1, size=count)) % count
     second = rng.integers(all, size=count)
-    while (same := (second == own) | (second == first)).any():
+    while (same := (second == targets) | (second == first)).any():
         second[same] = rng.integers(all, size=int(same.sum()))
     return first, second

@@ -104,13 +104,13 @@ def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
 
     width = instance.upper - instance.lower
     first = np.clip(x, instance.lower, instance.upper)
-    n, found = len(width), list[tuple[float, Array]]()
+    n, ends = len(width), list[tuple[float, Array]]()
     for radius in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4):
         x = first
         for _ in range(4):
             cost, G = evaluate_interpreted(instance, x)
             if G.max() <= -SLACK / 2:
-                found.append((cost, x))
+                ends.append((cost, x))
                 break
             J = instance.jacobian(x) * width
             near = np.abs(J).sum(axis=1) * radius + G > -SLACK
@@ -126,7 +126,7 @@ def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
             if step.x is None:
                 break
             x = np.clip(x + radius * width * step.x[:n], instance.lower, instance.upper)
-    return min(found, key=lambda item: item[0])[1] if found else None
+    return min(ends, key=lambda item: item[0])[1] if ends else None
 
 
 def check_shipped_facts(instance: Judged) -> None:

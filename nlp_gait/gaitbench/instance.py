@@ -26,9 +26,9 @@ class OneSidedRows:
 
     def __init__(self, kernel: Kernel, problem: GaitProblem) -> None:
         lower, upper = kernel.row_bounds(problem)
-        own = len(lower) - len(problem.names)
-        both = np.stack([lower[:own], upper[:own]], axis=1)
-        self.row, side = (np.asarray(part) for part in np.nonzero(np.isfinite(both)))  # (m,) rows of the kernel
+        rows = len(lower) - len(problem.names)
+        both = np.stack([lower[:rows], upper[:rows]], axis=1)
+        self.row, side = (np.asarray(indexes) for indexes in np.nonzero(np.isfinite(both)))  # (m,) rows of the kernel
         self.sign = np.where(side == 1, 1.0, -1.0)  # (m,) +1 for an upper bound
         self.bound = both[self.row, side]  # (m,) [unit of the row]
         self.weight = kernel.weights[self.row]  # (m,) 1 / scale
@@ -206,5 +206,5 @@ def _load(id: str, unit_cube: bool) -> Instance:
 def _build_derivatives(problem: GaitProblem) -> ca.Function:
     x, p = ca.MX.sym("x", len(problem.names)), ca.MX.sym("p", len(problem.parameters))
     cost, g = build_kernel(problem).function(x, p)
-    own = g[: g.shape[0] - len(problem.names)]
-    return ca.Function("derivatives", [x, p], [ca.gradient(cost, x), ca.densify(ca.jacobian(own, x))])
+    rows = g[: g.shape[0] - len(problem.names)]
+    return ca.Function("derivatives", [x, p], [ca.gradient(cost, x), ca.densify(ca.jacobian(rows, x))])

@@ -53,10 +53,10 @@ def replace_variables(
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         return problem.assemble(see(point), ops)
 
-    display = replace(problem.display, motion=None if motion is None else lambda at: motion(see(at)))
+    display = replace(problem.display, motion=None if motion is None else lambda point: motion(see(point)))
     hints = replace(problem.hints, start=start)
-    own = {"variables": tuple(variables), "assemble": assemble, "display": display, "hints": hints}
-    return replace(problem, **{**own, **changes})
+    moved = {"variables": tuple(variables), "assemble": assemble, "display": display, "hints": hints}
+    return replace(problem, **{**moved, **changes})
 
 
 def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
@@ -94,7 +94,9 @@ def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[st
         raise InputError(f"an affine map of {problem.name} must be {n} x {n}, got {affine.matrix.shape}")
     old, low, scale = problem.names, problem.lower, problem.scale
     bounds = {
-        f"{v}.{end}": float(at) for end in ("lower", "upper") for v, at in zip(old, getattr(problem, end), strict=True)
+        f"{v}.{end}": float(bound)
+        for end in ("lower", "upper")
+        for v, bound in zip(old, getattr(problem, end), strict=True)
     }
     rows = zip(names or [f"z{k + 1}" for k in range(n)], affine.lower, affine.upper, affine.matrix.T, strict=True)
     variables = [

@@ -84,14 +84,14 @@ def make_biped_model(robot: Robot) -> Biped:
     feet = [robot.feet[side].link for side in SIDES]
     paths = [robot.path_to_root(foot) for foot in feet]
     shared = {joint.name for joint in paths[0]} & {joint.name for joint in paths[1]}
-    own = [[joint for joint in path if joint.name not in shared] for path in paths]
-    for side, path in zip(SIDES, own, strict=True):
+    single = [[joint for joint in path if joint.name not in shared] for path in paths]
+    for side, path in zip(SIDES, single, strict=True):
         if len(path) != LEG_JOINT_COUNT:
             raise InputError(
                 f"robot {robot.name!r}: the {side} leg must have {LEG_JOINT_COUNT} turning joints from where both legs meet to "
                 f"the foot, got {len(path)}: {', '.join(joint.name for joint in reversed(path)) or 'none'}"
             )
-    moving = {joint.name for path in own for joint in path}
+    moving = {joint.name for path in single for joint in path}
     held = {
         name: _choose_held_angle(joint, robot.posture_rad) for name, joint in robot.joints.items() if name not in moving
     }

@@ -69,27 +69,27 @@ def find_legs(robot: str, links: Links, joints: Joints, feet: Feet) -> Legs:
     if feet:
         left, right = (str(feet.get(side, {}).get("link")) for side in SIDES)
         return Legs((left, right), _split_chains(chains.get(left, []), chains.get(right, [])))
-    found: list[tuple[float, Legs]] = []
+    candidates: list[tuple[float, Legs]] = []
     others_m: list[tuple[float, str, tuple[str, str]]] = []
     for pair in combinations(sorted(chains), 2):
-        own = _split_chains(chains[pair[0]], chains[pair[1]])
-        count = len(own[0])
-        if count != len(own[1]) or not count or not _are_mirror_chains(*own):
+        split = _split_chains(chains[pair[0]], chains[pair[1]])
+        count = len(split[0])
+        if count != len(split[1]) or not count or not _are_mirror_chains(*split):
             continue
-        legs = Legs(pair, own)
+        legs = Legs(pair, split)
         if _are_arms(legs, links, chains):
             others_m.append(
-                (own[0][0].place[2], "belongs to arms: they begin above the other links' centre of mass", pair)
+                (split[0][0].place[2], "belongs to arms: they begin above the other links' centre of mass", pair)
             )
         elif count != LEG_JOINT_COUNT:
-            others_m.append((own[0][0].place[2], f"has legs of {count} joints, which is not supported", pair))
+            others_m.append((split[0][0].place[2], f"has legs of {count} joints, which is not supported", pair))
         else:
-            found.append((own[0][0].place[2], legs))
+            candidates.append((split[0][0].place[2], legs))
     remedy = (
         'name the feet in the JSON file next to the model: "feet": {"left": {"link": "..."}, "right": {"link": "..."}} '
         "(docs/custom-robots.md describes the supported legs)"
     )
-    if not found:
+    if not candidates:
         _, fault, pair = min(others_m, default=(0.0, "", ("", "")))
         hint = (
             f"the lowest pair, {pair[0]!r} and {pair[1]!r}, {fault}; if other links are the feet, "
@@ -100,8 +100,8 @@ def find_legs(robot: str, links: Links, joints: Joints, feet: Feet) -> Legs:
             f"robot {robot!r}: no feet found: two links, mirror images of each other (z is up), with {LEG_JOINT_COUNT} turning "
             f"joints each below the link where both legs meet; {hint}{remedy}"
         )
-    found.sort(key=lambda item: (item[0], item[1].feet))
-    lowest, *others = [legs for height, legs in found if height < found[0][0] + CLEARLY_LOWER_M]
+    candidates.sort(key=lambda item: (item[0], item[1].feet))
+    lowest, *others = [legs for height, legs in candidates if height < candidates[0][0] + CLEARLY_LOWER_M]
     if others:
         listed = "; ".join("{!r} and {!r}".format(*legs.feet) for legs in (lowest, *others))
         raise RobotDataError(f"robot {robot!r}: several pairs of links may be the feet: {listed}; {remedy}")

@@ -115,11 +115,11 @@ class Leg:
     def meeting_points(self) -> Array:
         """(6, 3) point of each axis: the hip or ankle if it passes through, otherwise the nearest one."""
         centres = [self.hip_m] * 3 + [self.points[3]] + [self.ankle_m] * 2
-        found = []
+        points = []
         for axis, point, centre in zip(self.axes, self.points, centres, strict=True):
             near = point + (axis @ (centre - point)) * axis
-            found.append(centre if np.linalg.norm(near - centre) < MEETING_M else near)
-        return np.array(found)
+            points.append(centre if np.linalg.norm(near - centre) < MEETING_M else near)
+        return np.array(points)
 
 
 def find_bend(low: float, high: float) -> float:
@@ -146,11 +146,11 @@ def make_leg(robot: Robot, side: str) -> Leg:
 def find_nearest_point(axes: Array, points: Array) -> Array:
     """Return the point (3,) with the least sum of squared distances to axes (k, 3) through points (k, 3)."""
     across = [np.eye(3) - np.outer(axis, axis) for axis in axes]
-    found: Array = np.linalg.lstsq(
+    solution: Array = np.linalg.lstsq(
         np.sum(across, axis=0), np.sum([p @ x for p, x in zip(across, points, strict=True)], axis=0), rcond=None
     )[0]
     # If the axes meet in one of the given points, return it exactly.
     for point in points:
-        if np.linalg.norm(found - point) < MEETING_M:
+        if np.linalg.norm(solution - point) < MEETING_M:
             return np.asarray(point)
-    return found
+    return solution

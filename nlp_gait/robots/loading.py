@@ -113,10 +113,12 @@ def find_robot_file(name: str) -> str:
             f"robot {name!r}: the package {package!r} is not installed; install it with pip, or give a file"
         ) from None
     stems = Counter(Path(str(file)).stem for file in files)
-    found = {path.stem if stems[path.stem] == 1 else path.parent.name: str(path) for path in map(Path, map(str, files))}
-    if robot not in found:
-        raise unknown(f"robot of {package!r}", robot, found)
-    return found[robot]
+    by_name = {
+        path.stem if stems[path.stem] == 1 else path.parent.name: str(path) for path in map(Path, map(str, files))
+    }
+    if robot not in by_name:
+        raise unknown(f"robot of {package!r}", robot, by_name)
+    return by_name[robot]
 
 
 def hash_robot(name_or_path: object) -> str:
@@ -128,17 +130,17 @@ def hash_robot(name_or_path: object) -> str:
 
 def list_robot_files(name_or_path: str) -> set[str]:
     """Return the files that describe a robot: its own, those that it extends or includes, meshes; raises as ``load_robot``."""
-    source, found = _find_description(split_name(name_or_path)[0]), set[str]()
-    while source.endswith(".json") and source not in found:
-        found.add(source)
+    source, files = _find_description(split_name(name_or_path)[0]), set[str]()
+    while source.endswith(".json") and source not in files:
+        files.add(source)
         source = _resolve(_read(source).extends or "", source)
     if source.endswith(MODEL_ENDINGS):
         from nlp_gait.robots.mjcf import list_dependencies
         from nlp_gait.robots.urdf import list_meshes
 
         with convert_errors(f"robot file {source!r}", RobotDataError):
-            found |= {source, *(list_dependencies(source) if source.endswith(".xml") else list_meshes(source))}
-    return {os.path.abspath(file) for file in found}
+            files |= {source, *(list_dependencies(source) if source.endswith(".xml") else list_meshes(source))}
+    return {os.path.abspath(file) for file in files}
 
 
 def _load(name_or_path: str) -> Robot:

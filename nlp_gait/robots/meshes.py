@@ -37,7 +37,9 @@ def find_mesh(address: str, robot_file: Path) -> Path | None:
     path = Path(address.removeprefix(PACKAGE).lstrip("/"))
     if ".." in path.parts or not path.parts:
         return None
-    listed = [Path(part) for name in FOLDER_VARIABLES for part in os.environ.get(name, "").split(os.pathsep) if part]
+    listed = [
+        Path(folder) for name in FOLDER_VARIABLES for folder in os.environ.get(name, "").split(os.pathsep) if folder
+    ]
     above = [*robot_file.absolute().parents, *listed, *(folder / "share" for folder in listed)]
     inside = [folder for folder in above if folder.name == path.parts[0]]
     candidates = [*(folder / path for folder in above), *(folder.joinpath(*path.parts[1:]) for folder in inside)]
@@ -147,17 +149,17 @@ def _read_collada(data: bytes) -> Array:
         nonlocal total
         if level > DEEPEST_NODE:
             raise ValueError("its nodes are nested too deeply")
-        for part in node:
-            if part.tag in ("matrix", "translate", "rotate", "scale"):
-                pose = pose @ _transform(part)
-            elif part.tag == "instance_geometry":
-                points = geometries[part.get("url")]
+        for child in node:
+            if child.tag in ("matrix", "translate", "rotate", "scale"):
+                pose = pose @ _transform(child)
+            elif child.tag == "instance_geometry":
+                points = geometries[child.get("url")]
                 total += len(points)
                 if total > MOST_POINTS:
                     raise ValueError(f"its instances have more than {MOST_POINTS} points; simplify it")
                 placed.append(move_points(points, pose))
-            elif part.tag == "node":
-                visit(part, pose, level + 1)
+            elif child.tag == "node":
+                visit(child, pose, level + 1)
 
     if scene is not None:
         visit(scene, np.eye(4), 0)
@@ -168,18 +170,18 @@ def _read_collada(data: bytes) -> Array:
 def _read_positions(geometry: Any) -> Array:
     vertices = geometry.find("mesh/vertices/input[@semantic='POSITION']")
     source = vertices.get("source").lstrip("#")
-    found = next(s for s in geometry.iter("source") if s.get("id") == source)
-    return np.array([float(word) for word in found.findtext("float_array").split()]).reshape(-1, 3)
+    array = next(s for s in geometry.iter("source") if s.get("id") == source)
+    return np.array([float(word) for word in array.findtext("float_array").split()]).reshape(-1, 3)
 
 
-def _transform(part: Any) -> Array:
-    values = [float(word) for word in (part.text or "").split()]
+def _transform(node: Any) -> Array:
+    values = [float(word) for word in (node.text or "").split()]
     pose = np.eye(4)
-    if part.tag == "matrix":
+    if node.tag == "matrix":
         return np.array(values).reshape(4, 4)
-    if part.tag == "translate":
+    if node.tag == "translate":
         pose[:3, 3] = values
-    elif part.tag == "scale":
+    elif node.tag == "scale":
         pose[:3, :3] = np.diag(values)
     else:
         pose[:3, :3] = rotate(np.array(values[:3]) / np.linalg.norm(values[:3]), math.radians(values[3]))

@@ -201,8 +201,8 @@ class Robot:
 
     def __post_init__(self) -> None:
         parts: tuple[Link | Joint, ...] = (*self.links.values(), *self.joints.values())
-        for part in parts:
-            part.check()
+        for piece in parts:
+            piece.check()
         if self.root not in self.links:
             raise RobotDataError(f"robot {self.name!r}: root {self.root!r} is not a link")
         children: set[str] = set()
@@ -228,7 +228,7 @@ class Robot:
     @cached_property
     def soles(self) -> Mapping[str, Foot]:
         """Feet and toes by link."""
-        return {foot.link: foot for part in (self.feet, self.toes) for foot in part.values()}
+        return {foot.link: foot for feet in (self.feet, self.toes) for foot in feet.values()}
 
     @cached_property
     def mass_kg(self) -> float:

@@ -48,10 +48,10 @@ class Mass(NamedTuple):
 
 def combine_masses(parts: Sequence[Mass]) -> Mass:
     """Return several masses in one frame as one; without any mass, the centre is that of the first."""
-    mass = sum(part.mass_kg for part in parts)
-    com = sum((part.mass_kg * part.com_m for part in parts), np.zeros(3)) / mass if mass > 0.0 else parts[0].com_m
+    mass = sum(body.mass_kg for body in parts)
+    com = sum((body.mass_kg * body.com_m for body in parts), np.zeros(3)) / mass if mass > 0.0 else parts[0].com_m
     tensor = sum(
-        (part.tensor_kgm2 + compute_point_inertia(part.mass_kg, part.com_m - com) for part in parts), np.zeros((3, 3))
+        (body.tensor_kgm2 + compute_point_inertia(body.mass_kg, body.com_m - com) for body in parts), np.zeros((3, 3))
     )
     return Mass(mass, com, tensor)
 

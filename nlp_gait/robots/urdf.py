@@ -98,7 +98,7 @@ def _read_foot_shapes(
     for name in moving:
         for shape in links[name].findall(kind):
             pose = make_pose(-poses[foot][:3, 3]) @ poses[name] @ _read_pose(shape)
-            for geometry in (part for parent in shape.findall("geometry") for part in parent):
+            for geometry in (child for parent in shape.findall("geometry") for child in parent):
                 corners = _list_shape_points(geometry, pose, path)
                 if corners is None:
                     missing.append(str(geometry.get("filename")))
@@ -152,9 +152,9 @@ def _check_attributes(element: Any, path: str) -> None:
     if odd := set(element.attrib) - ATTRIBUTES[element.tag]:
         text = f"unknown attribute {min(odd)!r} of {_name_owner(element)}"
         warn_once("robot file %r: %s; it is ignored, and may be removed", path, text)
-    for part in (*element, *element.findall("inertial/*")):
-        if part.tag in ATTRIBUTES and part.tag not in OWNERS and (odd := set(part.attrib) - ATTRIBUTES[part.tag]):
-            raise ValueError(f"{_name_owner(part)}: unknown attribute {min(odd)!r} of <{part.tag}>")
+    for child in (*element, *element.findall("inertial/*")):
+        if child.tag in ATTRIBUTES and child.tag not in OWNERS and (odd := set(child.attrib) - ATTRIBUTES[child.tag]):
+            raise ValueError(f"{_name_owner(child)}: unknown attribute {min(odd)!r} of <{child.tag}>")
 
 
 def _read_joint(element: Any) -> UrdfJoint:
@@ -265,5 +265,5 @@ def _read_numbers(
 
 def _name_owner(element: Any) -> str:
     """Return the link or joint that contains an element, for messages."""
-    owners = [part for part in (element, *element.iterancestors()) if part.tag in OWNERS]
+    owners = [node for node in (element, *element.iterancestors()) if node.tag in OWNERS]
     return f"{owners[0].tag} {owners[0].get('name')!r}"

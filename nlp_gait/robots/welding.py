@@ -94,9 +94,9 @@ def weld_faults(links: Links, joints: Joints, legs: Collection[str], notes: list
 def find_faults(parts: Mapping[str, Link] | Mapping[str, Joint]) -> dict[str, RobotDataError]:
     """Return what is wrong with links or joints, by name."""
     faults = {}
-    for name, part in parts.items():
+    for name, piece in parts.items():
         try:
-            part.check()
+            piece.check()
         except RobotDataError as fault:
             faults[name] = fault
     return faults
