@@ -73,7 +73,7 @@ def _write_log(
     stem = f"f{number}_{make_file_name(comparison.problem)}"
     dimension = int(np.max([len(record.x) for record in comparison.records], initial=1))
     data = Path(f"data_{stem}") / f"IOHprofiler_f{number}_DIM{dimension}.dat"
-    lines = ["evaluations raw_y", *(f"{at} {gap!r}" for run in runs for at, gap in run.lines)]
+    lines = ["evaluations raw_y", *(f"{count} {gap!r}" for run in runs for count, gap in run.lines)]
     content: dict[str, Any] = {
         "version": IOH_VERSION,
         "suite": "nlp-gait",

@@ -186,7 +186,7 @@ def _search(problem: GaitProblem, box: Array, rows: Numbers) -> tuple[list[_Poin
         unsure = (parts.lower[:, 0] < min(costs) - gap) | (parts.upper[:, 0] > max(costs) + gap)
         if _decide(points, None)[1] == "sampled":
             unsure |= _is_feasible(parts.lower) & ~_is_feasible(parts.upper)
-        size = sum(len(part.lower) for part in done) + len(boxes)
+        size = sum(len(piece.lower) for piece in done) + len(boxes)
         if not unsure.any() or size + unsure.sum() > BOXES:
             return points, _Parts(*(np.concatenate(ends) for ends in zip(*done, parts, strict=True)))
         done.append(_Parts(parts.lower[~unsure], parts.upper[~unsure]))

@@ -68,19 +68,21 @@ class Audit:
         """Biases that were found, in words; empty for none."""
         from scipy.stats import binomtest
 
-        found = []
+        biases = []
         centre = next(effect for effect in self.effects if effect.change == CENTRE)
         if centre.verdict == "better" and centre.a12 >= LARGE:
-            found.append(
+            biases.append(
                 f"gains where the optimum is in the middle of the box (A12 {centre.a12:.2f}, p {centre.p:.1g})"
             )
         if self.edge > CLIPPED:
-            found.append(f"clips: on noise, {100 * self.edge:.1f} % of the variables end exactly at a bound")
+            biases.append(f"clips: on noise, {100 * self.edge:.1f} % of the variables end exactly at a bound")
         values = self.runs * NOISE_VARIABLES
         test = binomtest(round(self.middle * values), values, MIDDLE, "greater")
         if self.middle > EXCESS * MIDDLE and test.pvalue < SIGNIFICANT:
-            found.append(f"on noise, {100 * self.middle:.1f} % of the variables end in the middle 10 % of their ranges")
-        return tuple(found)
+            biases.append(
+                f"on noise, {100 * self.middle:.1f} % of the variables end in the middle 10 % of their ranges"
+            )
+        return tuple(biases)
 
 
 class MovedProblem:

@@ -58,8 +58,8 @@ def parse_seeds(text: str) -> tuple[int, ...]:
         return list_test_seeds(datetime.now(UTC).date(), int(text.removeprefix("test:")))
     match = SEEDS.fullmatch(text)
     seeds = tuple(range(int(match[1]), int(match[2]))) if match else ()
-    if not match and all(part.strip().isdecimal() for part in text.split(",")):
-        seeds = tuple(int(part) for part in text.split(","))
+    if not match and all(word.strip().isdecimal() for word in text.split(",")):
+        seeds = tuple(int(word) for word in text.split(","))
     if not 0 < len(seeds) <= MOST_SEEDS:
         raise InputError(
             f"--seeds takes FIRST:END, test:COUNT or numbers with commas, at most {MOST_SEEDS}, got {text!r}"

@@ -66,15 +66,17 @@ def rank_solvers(instances: Sequence[str], records: Sequence[RunRecord] = (), *,
 def _make_standings(comparisons: Sequence[Comparison]) -> list[Standing]:
     from scipy.stats import rankdata
 
-    found, names = index_solvers(comparisons)
-    costs = np.array([[[on[name].expected_cost(t) for name in names] for t in TARGETS] for on in found])
+    indexes, names = index_solvers(comparisons)
+    costs = np.array([[[on[name].expected_cost(t) for name in names] for t in TARGETS] for on in indexes])
     rows = costs.reshape(-1, len(names))
     rows = rows[np.isfinite(rows).any(axis=1)]
     equal = (len(names) + 1) / 2  # where no solver reaches a target
     ranks = rankdata(rows, axis=1).mean(axis=0) if len(rows) else np.full(len(names), equal)
     solved = [
         float(
-            np.mean([math.isfinite(c.cost_to_reach(t)) for on in found for c in on[name].curves for t in ECDF_TARGETS])
+            np.mean(
+                [math.isfinite(c.cost_to_reach(t)) for on in indexes for c in on[name].curves for t in ECDF_TARGETS]
+            )
         )
         for name in names
     ]
@@ -86,7 +88,7 @@ def _make_standings(comparisons: Sequence[Comparison]) -> list[Standing]:
                 mean_rank=float(ranks[k]),
                 solved=solved[k],
                 solved_rank=int(places[k]),
-                feasible=float(np.mean([math.isfinite(cost) for on in found for cost in on[name].costs])),
+                feasible=float(np.mean([math.isfinite(cost) for on in indexes for cost in on[name].costs])),
                 reached=tuple(int(np.isfinite(costs[:, t, k]).sum()) for t in range(len(TARGETS))),
             )
             for k, name in enumerate(names)

@@ -62,7 +62,7 @@ def list_problems(
     if robot is not None:
         raise InputError("--robot takes a problem, or no name")
     algorithms = [describe_solver(one) for one in (known if name == ALGORITHMS else [name])]
-    parts = [part for algorithm in algorithms for part in _describe_algorithm(algorithm)]
+    parts = [line for algorithm in algorithms for line in _describe_algorithm(algorithm)]
     return Output(data={"algorithms": [asdict(algorithm) for algorithm in algorithms]}, parts=parts)
 
 

@@ -143,7 +143,7 @@ def parse_names(text: str) -> list[str]:
 
 def parse_numbers(name: str, text: str, flag: str) -> list[float]:
     """Return comma-separated numbers; raises as ``parse_number``."""
-    return [parse_number(name, part, flag) for part in text.split(",")]
+    return [parse_number(name, word, flag) for word in text.split(",")]
 
 
 def parse_number(name: str, text: str, flag: str) -> float:

@@ -99,11 +99,11 @@ def print_output(output: Output, as_json: bool) -> None:
         data = replace_nan({**output.data, "files": [str(path) for path in output.written]})
         sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
         return
-    for part in output.parts:
-        if isinstance(part, str):
-            stdout.print(part)
+    for block in output.parts:
+        if isinstance(block, str):
+            stdout.print(block)
         else:
-            print_table(*part)
+            print_table(*block)
     for path in output.written:
         stdout.print(f"wrote {path}", soft_wrap=True)
     for sentence in output.answer:

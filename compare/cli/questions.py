@@ -76,17 +76,17 @@ def certainty(
 def _check(path: Path, seed: int, repeat_in: Path | None) -> Output:
     file = read_certificate(path)
     proof, points = file.certificate, {"a search": search_point(load_certified_problem(file), seed)}
-    found, repeated = check_certificate(file, points=points, seed=seed), None
+    check, repeated = check_certificate(file, points=points, seed=seed), None
     if repeat_in is not None:
         make_writable_folder(repeat_in)
         with show_progress("boxes", None) as advance:
             repeated = repeat_proof(file, progress=advance, checkpoint=repeat_in / f".{path.stem}.open")
     parts = [
         f"{file.problem['name']}: bound {proof.bound:.9g}, incumbent {proof.objective:.9g}. No better point was found; the best "
-        f"one is of {found.source}, {found.best:.9g}. {found.paths} paths of up to {found.deepest} halvings end; "
-        f"{found.pieces:,} boxes dropped on them are proven to contain nothing better; they suggest about {found.boxes:,.0f} "
+        f"one is of {check.source}, {check.best:.9g}. {check.paths} paths of up to {check.deepest} halvings end; "
+        f"{check.pieces:,} boxes dropped on them are proven to contain nothing better; they suggest about {check.boxes:,.0f} "
         f"boxes in total (within a factor of ten), the certificate has {proof.boxes:,}"
-        + ("" if found.same_prover else "; it was made by another version of the prover")
+        + ("" if check.same_prover else "; it was made by another version of the prover")
     ]
     if repeated is not None:
         parts.append(
@@ -94,7 +94,7 @@ def _check(path: Path, seed: int, repeat_in: Path | None) -> Output:
             f"point is better than {repeated.bound:.9g}"
         )
     return Output(
-        data={"schema": 1, **asdict(found), "repeated": None if repeated is None else asdict(repeated)}, parts=parts
+        data={"schema": 1, **asdict(check), "repeated": None if repeated is None else asdict(repeated)}, parts=parts
     )
 
 
@@ -125,14 +125,14 @@ def _list_variants(problem: GaitProblem, over: str | None, named: Sequence[str] 
     """Return the variants that ``--over`` and ``--variant`` describe."""
     option, _, values = (over or "").partition("=")
     if over is None:
-        found = [Variant(name="as given")]
+        variants = [Variant(name="as given")]
     elif values:
-        found = [
+        variants = [
             Variant(name=value, options=options.parse_options(problem.address, [(option, value)]))
             for value in options.parse_names(values)
         ]
     elif option in ("motors", "trajectory"):
-        found = [*(MOTORS if option == "motors" else list_trajectories(problem))]
+        variants = [*(MOTORS if option == "motors" else list_trajectories(problem))]
     else:
         raise InputError(f"--over takes motors, trajectory or OPTION=VALUE,VALUE,..., got {over!r}")
     for text in named or ():
@@ -143,12 +143,12 @@ def _list_variants(problem: GaitProblem, over: str | None, named: Sequence[str] 
         given = dict(options.parse_pairs(pairs, "--variant NAME:"))
         other = given.pop(PROBLEM, "")
         changed = options.parse_options(other or problem.address, given.items())
-        found.append(Variant(name=name.strip(), options=changed, problem=other))
-    if len(found) < 2:
+        variants.append(Variant(name=name.strip(), options=changed, problem=other))
+    if len(variants) < 2:
         raise InputError(
             "name at least two variants by --over or --variant; the problem itself is one of those of --variant"
         )
-    return found
+    return variants
 
 
 @command
@@ -287,11 +287,13 @@ def write_answer(answer: Answer, out: Path, stopped: str = "", problems: Sequenc
     if pressed() and not stopped:
         stopped = "interrupted at the end"
     parts: list[str | Rows] = [answer.title, *answer.headline]
-    for part in iterate_leaves(answer.parts):
-        if isinstance(part, str):
-            parts.append(part)
-        elif isinstance(part, Table) and not part.name:
-            parts.append(Rows(part.caption, tuple(part.columns), [[cell.text for cell in row] for row in part.cells]))
+    for block in iterate_leaves(answer.parts):
+        if isinstance(block, str):
+            parts.append(block)
+        elif isinstance(block, Table) and not block.name:
+            parts.append(
+                Rows(block.caption, tuple(block.columns), [[cell.text for cell in row] for row in block.cells])
+            )
     return Output(
         data=answer.data,
         parts=parts,

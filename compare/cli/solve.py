@@ -163,7 +163,7 @@ def plan(
             turn_deg=turn_deg,
             steps=steps,
             distance_m=distance,
-            speeds_m_s=[options.parse_number("speed", part, "--speeds") for part in options.parse_names(speeds)],
+            speeds_m_s=[options.parse_number("speed", word, "--speeds") for word in options.parse_names(speeds)],
             settings=settings,
         )
     elif stairs:

@@ -215,8 +215,8 @@ class Certainty(Question[FoundCertainty]):
 
 def search_point(problem: GaitProblem, seed: int = 0) -> Array:
     """Return the best point (n,) of a short search by PSO, which shares only the exact functions with IPOPT and proofs."""
-    found = minimize(compile_objective(problem), make_algorithm("pso"), evaluations=CHECK_EVALUATIONS, seed=seed)
-    return np.array(found.x)
+    search = minimize(compile_objective(problem), make_algorithm("pso"), evaluations=CHECK_EVALUATIONS, seed=seed)
+    return np.array(search.x)
 
 
 def _search(problem: GaitProblem, best: float, evaluations: int, seed: int) -> LongSearch:

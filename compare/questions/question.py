@@ -151,8 +151,8 @@ def _flatten(value: Any, path: str = "") -> Iterator[tuple[str, Value]]:
     if not isinstance(value, Mapping):
         yield path, value
         return
-    for key, part in value.items():
-        yield from _flatten(part, f"{path}.{key}" if path else str(key))
+    for key, entry in value.items():
+        yield from _flatten(entry, f"{path}.{key}" if path else str(key))
 
 
 def make_optima_table(optima: Mapping[str, Mapping[str, float]]) -> Table:

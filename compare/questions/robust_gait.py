@@ -58,12 +58,14 @@ def make_worst_case(scenarios: Sequence[GaitProblem]) -> GaitProblem:
         parts = [assembly, *(scenario.assemble(point, ops) for scenario in scenarios[1:])]
         constraints = tuple(
             replace(constraint, name=f"{constraint.name}@{k}" if k else constraint.name)
-            for k, part in enumerate(parts)
-            for constraint in part.constraints
+            for k, assembly in enumerate(parts)
+            for constraint in assembly.constraints
         )
         # As the minimum of the negatives: its lifted variable is an epigraph variable for any objectives.
-        worst = -reduce(ops.min, [-part.objective for part in parts])
-        indexes = {f"{name}@{k}" if k else name: v for k, part in enumerate(parts) for name, v in part.indexes.items()}
+        worst = -reduce(ops.min, [-assembly.objective for assembly in parts])
+        indexes = {
+            f"{name}@{k}" if k else name: v for k, assembly in enumerate(parts) for name, v in assembly.indexes.items()
+        }
         return Assembly(objective=worst, constraints=constraints, indexes=indexes)
 
     worst = first.derive(title=f"{first.title}, worst of {len(scenarios)} scenarios", change=change)

@@ -125,9 +125,9 @@ class Sweep(Question[list[SweepPoint]]):
             ends, interrupt = cast("list[Solution | RunRecord | None]", error.partial), error
             if not tasks[0].is_search:
                 interrupt = Interrupted(f"{error.sentence}, not all of them solved in both directions", None)
-        ended = ((at, end) for at, end in zip(path, ends, strict=False) if end is not None)
-        points = {tuple(at.values()): self._make_point(at, end) for at, end in ended}
-        grid = [points[at] for at in itertools.product(*(axis.values for axis in self.axes)) if at in points]
+        ended = ((place, end) for place, end in zip(path, ends, strict=False) if end is not None)
+        points = {tuple(place.values()): self._make_point(place, end) for place, end in ended}
+        grid = [points[place] for place in itertools.product(*(axis.values for axis in self.axes)) if place in points]
         if grid:
             yield grid
         if interrupt is not None:
@@ -177,7 +177,7 @@ class Sweep(Question[list[SweepPoint]]):
     @cached_property
     def _tasks(self) -> list[Task]:
         stop = Stop(evaluations=self.evaluations)
-        problems = [ProblemSpec(name=self.problem.place(at)) for at in self._path]
+        problems = [ProblemSpec(name=self.problem.place(place)) for place in self._path]
         return [Task(problem=problem, solver=self.algorithm, stop=stop, seed=self.seed) for problem in problems]
 
     def report(self, findings: list[SweepPoint]) -> Answer:

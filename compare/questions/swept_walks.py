@@ -138,11 +138,11 @@ def plot_costs(points: Sequence[SweepPoint], problem: GaitProblem) -> Drawing:
     """Plot cost of transport, step length and durations along the only axis; infeasible points as crosses."""
     (name,) = points[0].at
     good = [point for point in points if point.feasible]
-    at = [point.at[name] for point in good]
+    places = [point.at[name] for point in good]
     with use_style():
         figure = make_figure(6.3, 5.0)
         cost, lengths, times = figure.subplots(3, 1, sharex=True, height_ratios=(2, 1, 1))
-        cost.plot(at, [point.indexes[COST] for point in good], "o-", color=MODEL, label="model")
+        cost.plot(places, [point.indexes[COST] for point in good], "o-", color=MODEL, label="model")
         walks = [(point, point.walk) for point in good if point.walk is not None]
         covered = [  # energy over the distance that was really covered
             (point.at[name], walk.engine_J_per_m / point.indexes["energy_J_per_m"] * point.indexes[COST])
@@ -156,10 +156,10 @@ def plot_costs(points: Sequence[SweepPoint], problem: GaitProblem) -> Drawing:
         mark_values(cost, [point.at[name] for point in points if not point.feasible], "infeasible")
         cost.set(ylabel="cost of transport\nP / (m g v)")
         cost.legend()
-        lengths.plot(at, [1000.0 * point.indexes["step_length_m"] for point in good], "o-", color=MODEL)
+        lengths.plot(places, [1000.0 * point.indexes["step_length_m"] for point in good], "o-", color=MODEL)
         lengths.set(ylabel="step\n[mm]")
         for time, colour in zip(problem.display.durations, PHASE_COLOURS, strict=False):
-            times.plot(at, [point.x[time] for point in good], "o-", color=colour, label=_name_phase(time))
+            times.plot(places, [point.x[time] for point in good], "o-", color=colour, label=_name_phase(time))
         times.set(ylabel="time [s]", xlabel=make_axis_label(name, list_units(problem)[name]))
         times.legend(ncols=2)
         for axes in (cost, lengths, times):

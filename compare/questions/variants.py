@@ -142,7 +142,7 @@ class Variants(Question[tuple[SolvedVariant, ...]]):
             near, x0 = self._find_start(variant, problem, solved)
             starts = 1 if variant.alone and x0 is not None else self.starts
             solution = solve(problem, starts=starts, seed=self.seed, x0=x0, solver=solver)
-            found = evaluate(problem, solution.x, prove=False)
+            judged = evaluate(problem, solution.x, prove=False)
             solved[variant.name] = SolvedVariant(
                 name=variant.name,
                 problem=problem.name,
@@ -152,9 +152,9 @@ class Variants(Question[tuple[SolvedVariant, ...]]):
                 status=solution.status,
                 objective=solution.objective,
                 unit=problem.objective.unit,
-                indexes=found.indexes,
-                dense=found.dense,
-                worst="".join(f"{row.name} by {row.violation:.2g} {row.unit}" for row in found.dense_violations[:1]),
+                indexes=judged.indexes,
+                dense=judged.dense,
+                worst="".join(f"{row.name} by {row.violation:.2g} {row.unit}" for row in judged.dense_violations[:1]),
                 start=near,
                 converged=sum(start.converged for start in solution.starts),
                 starts=len(solution.starts),
@@ -170,15 +170,15 @@ class Variants(Question[tuple[SolvedVariant, ...]]):
         self, variant: Variant, problem: GaitProblem, solved: Mapping[str, SolvedVariant]
     ) -> tuple[str, Array | None]:
         """Return name and start of the richest earlier variant that this one contains, or joints fitted to the richest one."""
-        feasible = [found for found in solved.values() if found.feasible]
-        feasible.sort(key=lambda found: (found.problem == problem.name, found.variables), reverse=True)
-        variants = {each.name: each for each in self.variants}
-        for found in feasible:
-            if not self._has_curves(problem, variants[found.name]):
+        feasible = [solution for solution in solved.values() if solution.feasible]
+        feasible.sort(key=lambda solution: (solution.problem == problem.name, solution.variables), reverse=True)
+        variants = {variant.name: variant for variant in self.variants}
+        for solution in feasible:
+            if not self._has_curves(problem, variants[solution.name]):
                 continue
-            x = convert_motion(found.x, problem)
+            x = convert_motion(solution.x, problem)
             if x is not None:
-                return found.name, np.clip(x, problem.lower, problem.upper)
+                return solution.name, np.clip(x, problem.lower, problem.upper)
         if feasible and problem.name in FITTED_STARTS:
             planned = load_variant(self.problem, variants[feasible[0].name])
             fit = resolve(FITTED_STARTS, problem.name)
