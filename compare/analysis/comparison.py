@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.best_known import ZERO, compute_gap, is_zero
-from compare.analysis.pairs import Pair, Sample, compare_pairs
+from compare.analysis.pairs import Pair, compare_pairs
 from compare.analysis.record_statistics import (
     Curve,
     Weighting,
@@ -24,7 +24,7 @@ from compare.analysis.units import format_percent, with_unit
 from compare.study.definition import SOURCE, describe_edition, select_shared
 from compare.study.record import RunRecord
 from compare.study.references import BETTER, Reference, find_reference
-from compare.study.task import FUNCTION, GRADIENT_SOLVERS
+from compare.study.task import GRADIENT_SOLVERS
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
@@ -122,12 +122,8 @@ class Comparison:
     @cached_property
     def pairs(self) -> list[Pair]:
         """Tests of all pairs of solvers; differences within the judge's tolerance are ties."""
-        samples = []
         tied = tie([solver.costs for solver in self.solvers], self.reference)
-        for solver, costs in zip(self.solvers, tied, strict=True):
-            paired = {r.seed: cost for r, cost in zip(solver.records, costs, strict=True) if _shares_start(r)}
-            samples.append(Sample(solver=solver.name, costs=costs, paired=paired))
-        return compare_pairs(samples)
+        return compare_pairs({solver.name: costs for solver, costs in zip(self.solvers, tied, strict=True)})
 
     @property
     def leaders(self) -> set[str]:
@@ -204,13 +200,6 @@ def index_solvers(comparisons: Sequence[Comparison]) -> tuple[list[dict[str, Sol
     """Return the solvers of each comparison by name, and the names of those that ran on all problems."""
     found = [{solver.name: solver for solver in comparison.solvers} for comparison in comparisons]
     return found, [name for name in found[0] if all(name in solvers for solvers in found)] if found else []
-
-
-def _shares_start(record: RunRecord) -> bool:
-    """Return whether a run starts from the points that searches with its seed share."""
-    if record.settings.get("kind") == FUNCTION:  # it receives no starting points
-        return False
-    return "handling" in record.definition or "polishes" in record.definition
 
 
 def read_objective(record: RunRecord) -> Objective:

@@ -9,27 +9,12 @@ from compare.study.record import RunRecord
 
 def describe_unknown(comparison: Comparison) -> list[str]:
     """Return a sentence for each solver with runs whose evaluations are unknown."""
-    sentences = []
-    for solver in comparison.solvers:
-        runs = [r.run for r in solver.records if not r.evaluations]
-        if runs:
-            which = f"run {runs[0]}" if len(runs) == 1 else f"runs {_join_numbers(runs)}"
-            sentences.append(
-                f"{solver.name}, {which} of {len(solver.records)}: the number of evaluations is unknown; all statistics of "
-                f"evaluations exclude {solver.name}."
-            )
-    return sentences
-
-
-def _join_numbers(numbers: Sequence[int]) -> str:
-    """Return ascending numbers with their gaps: ``0 to 3, 7``."""
-    parts: list[list[int]] = []
-    for number in numbers:
-        if parts and number == parts[-1][-1] + 1:
-            parts[-1].append(number)
-        else:
-            parts.append([number])
-    return ", ".join(f"{part[0]}" if len(part) == 1 else f"{part[0]} to {part[-1]}" for part in parts)
+    unknown = {s.name: (sum(not r.evaluations for r in s.records), len(s.records)) for s in comparison.solvers}
+    return [
+        f"{name}: the number of evaluations of {count} of {runs} runs is unknown; all statistics of evaluations exclude {name}."
+        for name, (count, runs) in unknown.items()
+        if count
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -186,25 +186,6 @@ def compute_rank_sum(a: Sequence[float], b: Sequence[float]) -> float:
     return float(mannwhitneyu(a, b, alternative="two-sided").pvalue)
 
 
-def compute_signed_rank(a: Sequence[float], b: Sequence[float]) -> float:
-    """Two-sided p-value of Wilcoxon's signed-rank test on pairs (R,) of runs with the same seed and starting points.
-
-    A run without a feasible point differs from one with by more than any two runs with one; pairs that are equal, or both
-    without, are dropped. 1 if no pair is left.
-
-    Source:
-        Wilcoxon (1945), Individual comparisons by ranking methods, as in ``scipy.stats.wilcoxon``.
-    """
-    from scipy.stats import wilcoxon
-
-    pooled = np.concatenate([a, b])
-    finite = pooled[np.isfinite(pooled)]
-    beyond = 2.0 * (finite.max() - finite.min()) + 1.0 + finite.max() if finite.size else 0.0
-    differences = np.where(np.isfinite(a), a, beyond) - np.where(np.isfinite(b), b, beyond)
-    differences = differences[differences != 0.0]
-    return float(wilcoxon(differences).pvalue) if differences.size else 1.0
-
-
 def correct_by_holm(p: Sequence[float]) -> Array:
     """P-values (T,) of a family of tests, adjusted so that rejecting below alpha keeps the family-wise error at alpha.
 

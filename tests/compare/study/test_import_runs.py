@@ -154,10 +154,8 @@ def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_pat
     assert rows[-1][header.index("evaluations")] == "-"
     page = " ".join((out / "report.md").read_text().split())
     assert not re.search(r"\bnan\b", page, re.IGNORECASE)
-    for solver, runs in (("paper", "1 to 2"), ("thesis", "0 to 2")):
-        sentence = (
-            f"{solver}, runs {runs} of 3: the number of evaluations is unknown; all statistics of evaluations exclude"
-        )
+    for solver, count in (("paper", 2), ("thesis", 3)):
+        sentence = f"{solver}: the number of evaluations of {count} of 3 runs is unknown; all statistics of evaluations exclude"
         assert sentence in page and sentence in describe_unknown(comparison)[solver == "thesis"]
     with open(out / "runs.csv") as file:
         rows = [r for r in csv.DictReader(file) if r["solver"] == "paper"]
