@@ -4,12 +4,11 @@ Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not 
 130 interrupted. Only the module of the command that is called is imported.
 """
 
-from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
 from nlp_gait.providers import import_object
@@ -82,26 +81,43 @@ def load_command(name: str) -> Any:
     return get_command(alone)
 
 
+class ImportedWhenUsed(TyperCommand):
+    """A command whose module is imported when its options are needed; the list of commands needs its summary alone."""
+
+    @property
+    def params(self) -> list[Any]:
+        """Its arguments and options."""
+        return load_command(str(self.name)).params
+
+    @params.setter
+    def params(self, _: object) -> None:
+        """Ignore those of the function in its place, which has none."""
+
+    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        """Parse the arguments by the command's own parser."""
+        known = {flag for parameter in self.params for flag in (*parameter.opts, *parameter.secondary_opts)}
+        for flag in (arg.split("=")[0] for arg in args if arg.startswith("--")):
+            if flag not in known:
+                _refuse_removed(f"{self.name} {flag}", flag)
+        return load_command(str(self.name)).make_context(info_name, args, parent, **extra)
+
+
 class Commands(TyperGroup):
-    """Commands that are imported when they are called; a removed name ends with one sentence that names the new way."""
+    """Commands, without removed ones."""
 
     def resolve_command(self, context: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
-        """Return name, parser and arguments of the command."""
-        parser = load_command(args[0]) if args[0] in self.commands else None
-        for name in [args[0]] if parser is None else _list_unknown_options(parser, args):
-            if name in REPLACEMENTS:
-                from compare.cli.printing import fail
-
-                fail(f"{name.split()[-1]} was removed: {REPLACEMENTS[name]}", status=2)
-        known, _, rest = super().resolve_command(context, args)
-        return known, parser, rest
+        """Return name, command and arguments."""
+        _refuse_removed(args[0])
+        return super().resolve_command(context, args)
 
 
-def _list_unknown_options(parser: Any, args: Sequence[str]) -> list[str]:
-    """Return the keys, in the table of removed names, of options that a command does not have."""
-    known = {flag for parameter in parser.params for flag in (*parameter.opts, *parameter.secondary_opts)}
-    flags = [arg.split("=")[0] for arg in args[1:] if arg.startswith("--")]
-    return [key for flag in flags if flag not in known for key in (f"{args[0]} {flag}", flag)]
+def _refuse_removed(*names: str) -> None:
+    """End with one sentence that says what serves instead of a removed command or option."""
+    for name in names:
+        if name in REPLACEMENTS:
+            from compare.cli.printing import fail
+
+            fail(f"{name.split()[-1]} was removed: {REPLACEMENTS[name]}", status=2)
 
 
 app = typer.Typer(
@@ -113,7 +129,7 @@ app = typer.Typer(
 )
 for panel, commands in PANELS.items():
     for name, (_, summary) in commands.items():
-        app.command(name, rich_help_panel=panel, short_help=summary)(lambda: None)  # its line in the help
+        app.command(name, cls=ImportedWhenUsed, rich_help_panel=panel, short_help=summary)(lambda: None)
 
 
 def _print_version(requested: bool) -> None:
