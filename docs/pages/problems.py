@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import get_args, get_origin, get_type_hints
+from typing import Literal, get_args, get_origin, get_type_hints
 
 from compare.analysis.units import with_unit
 from compare.drawing.gait_figure import plot_gait
@@ -305,7 +305,7 @@ def _options(problem: GaitProblem) -> str:
     rows = []
     for name, parameter in inspect.signature(make).parameters.items():
         hint = hints.get(name)
-        choices = ", ".join(f"`{choice}`" for choice in get_args(hint)) if get_origin(hint) is not None else ""
+        choices = ", ".join(f"`{choice}`" for choice in get_args(hint)) if get_origin(hint) is Literal else ""
         rows.append((code(name), code(str(parameter.default)), choices, literal(words.get(name, ""))))
     text = "Options of the problem: `--set NAME=VALUE`, or keywords of `nlp_gait.load`."
     return page("## Options", text, table(("option", "default", "one of", "what"), rows)).strip()
