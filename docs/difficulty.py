@@ -135,7 +135,7 @@ def measured(name: str, folder: Path, starts: int, runs: int, jobs: int) -> Diff
 
 def cost_of(record: RunRecord) -> float:
     """Objective as it is minimised, infinite where the judge finds the point infeasible."""
-    sign = -1.0 if record.definition["objective"]["sense"] == "maximise" else 1.0
+    sign = record.inputs.objective.sign
     return sign * record.verdict.objective if record.verdict.feasible else math.inf
 
 

@@ -51,7 +51,7 @@ def format_count(number: float) -> str:
 
 def count_claimed(comparison: Comparison, solver: SolverRuns) -> int | None:
     """Return the number of runs whose solver claims a feasible result; None for imported results without claims."""
-    if all("imported" in r.definition and r.claimed_objective is None for r in solver.records):
+    if all(r.inputs.imported and r.claimed_objective is None for r in solver.records):
         return None
     return sum(r.claimed for r in solver.records)
 

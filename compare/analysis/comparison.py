@@ -1,12 +1,10 @@
 """The runs of all solvers on one problem on a common scale: the basis of tables, figures and verdicts."""
 
 import math
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from statistics import median
-from typing import Any
 
 import numpy as np
 
@@ -21,22 +19,17 @@ from compare.analysis.record_statistics import (
     tie,
 )
 from compare.analysis.units import format_percent, with_unit
-from compare.study.definition import SOURCE, describe_edition, select_shared
 from compare.study.record import RunRecord
 from compare.study.references import BETTER, Reference, find_reference
-from compare.study.task import GRADIENT_SOLVERS
+from compare.study.task import GRADIENT_SOLVERS, SOURCE
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
-from nlp_gait.files import convert_errors
 from nlp_gait.formulation import Objective
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
 DEFAULT_WEIGHTING = Weighting()
 FOUND = 1e-6  # a run with at most this gap has reached the best known value
-# An edition's name is a label, so that files can be named after it.
-NOT_IN_LABELS = re.compile(r"[^A-Za-z0-9._+: -]")
-LONGEST = 30
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,12 +54,12 @@ class SolverRuns:
     @property
     def is_gradient(self) -> bool:
         """Whether its runs are starts of a gradient method."""
-        return all(r.definition["solver"] in GRADIENT_SOLVERS and "polishes" not in r.definition for r in self.records)
+        return all(r.inputs.solver in GRADIENT_SOLVERS for r in self.records)
 
     @property
     def is_user_defined(self) -> bool:
         """Whether it is the user's own: code, a program, or imported results."""
-        return any("imported" in r.definition or SOURCE in (r.definition.get("solver") or {}) for r in self.records)
+        return any(r.inputs.imported or SOURCE in r.inputs.solver for r in self.records)
 
     @property
     def best(self) -> RunRecord | None:
@@ -167,11 +160,11 @@ def compare_problems(
 def _make_comparison(
     problem: str, records: Sequence[RunRecord], weighting: Weighting, reference: float | None
 ) -> Comparison:
-    objective = read_objective(records[0])
+    objective = records[0].inputs.objective
     for record in records:
-        if read_objective(record) != objective:
+        if record.inputs.objective != objective:
             raise InputError(f"records of {problem!r} disagree on the objective: {record.solver}, run {record.run}")
-    known = find_reference(records[0].definition["problem"])
+    known = find_reference(records[0].inputs.problem)
     if reference is None:
         reference = find_best_known(records, objective) if known.objective is None else known.objective
     solvers = []
@@ -200,41 +193,3 @@ def index_solvers(comparisons: Sequence[Comparison]) -> tuple[list[dict[str, Sol
     """Return the solvers of each comparison by name, and the names of those that ran on all problems."""
     found = [{solver.name: solver for solver in comparison.solvers} for comparison in comparisons]
     return found, [name for name in found[0] if all(name in solvers for solvers in found)] if found else []
-
-
-def read_objective(record: RunRecord) -> Objective:
-    """Return the objective of a record; raises InputError if the record has none, or an invalid one."""
-    with convert_errors(f"record of {record.solver}, run {record.run}", InputError):
-        return decode(Objective, record.definition.get("objective"), "objective")
-
-
-def label_editions(records: Sequence[RunRecord]) -> list[RunRecord]:
-    """Rename records whose problem or solver differs from the latest one of that name: ``pso (evaluations 500)``.
-
-    The definition of the first record keeps the name; ``read_records`` puts the latest first.
-    """
-    first: dict[str, dict[str, Any]] = {}
-    named: dict[tuple[str, str], str] = {}
-    found = []
-    for record in records:
-        whole = select_shared(record.definition)
-        problem = _name(record.problem, {"problem": whole["problem"], "solver": ""}, first, named)
-        solver = _name(f"{problem}\0{record.solver}", whole, first, named).partition("\0")[2]
-        found.append(replace(record, problem=problem, solver=solver))
-    return found
-
-
-def _name(
-    label: str, definition: Mapping[str, Any], first: dict[str, dict[str, Any]], named: dict[tuple[str, str], str]
-) -> str:
-    """Return a label with the differences from the first definition of that label."""
-    key = label, hash_json(definition)
-    if key not in named:
-        name = label
-        if label in first:
-            difference = NOT_IN_LABELS.sub("", describe_edition(definition, first[label]))[:LONGEST]
-            name = f"{label} ({difference})"
-            name = name if name not in named.values() else f"{label} ({key[1][:8]})"
-        first.setdefault(label, dict(definition))
-        named[key] = name
-    return named[key]

@@ -12,11 +12,12 @@ from importlib.resources import files
 from pathlib import Path
 
 from compare.archive.unpack import MANIFEST, ArchiveManifest, unpack_archive
-from compare.study.definition import SOURCE
-from compare.study.record import RunRecord, format_now, hash_installed_code
-from compare.study.record_files import RECORDS
+from compare.study.origin import format_now, hash_installed_code
+from compare.study.record import RunRecord
+from compare.study.record_files import locate_record
 from compare.study.references import find_reference
 from compare.study.settings import FILE, Manifest, read_manifest
+from compare.study.task import SOURCE
 from nlp_gait.backends.identity import FILES
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_bytes, replace_file
@@ -39,13 +40,12 @@ def pack_study(folder: Path, records: Sequence[RunRecord], out: Path) -> Path:
         UserCodeError: user code took part that the command does not name.
         OutputError: the archive cannot be written.
     """
+    others = (path for pattern in PARTS for path in sorted(folder.glob(pattern)) if path.is_file())
     content = {
         path.relative_to(folder).as_posix(): read_bytes(path, "file of the study")
-        for pattern in (f"{RECORDS}/*/*.json", *PARTS)
-        for path in sorted(folder.glob(pattern))
-        if path.is_file()
+        for path in (*(locate_record(folder, record) for record in records), *others)
     }
-    options = (record.definition["problem"] for record in records)
+    options = (record.inputs.problem for record in records)
     texts = {str(problem["options"][option]) for problem in options for option in problem.get(FILES, ())}
     robots = {text: _collect_robot(text, content) for text in sorted(texts)}
     _collect_code(records, content)
@@ -107,7 +107,7 @@ def _check_archive(path: Path, robots: Mapping[str, str]) -> None:
 def _collect_code(records: Sequence[RunRecord], content: dict[str, bytes]) -> None:
     """Add user-defined problems and solvers, with the files next to them that they import."""
     for record in records:
-        problem, solver = record.definition["problem"], record.definition["solver"]
+        problem, solver = record.inputs.problem, record.inputs.solver
         code: list[tuple[Kind, str]] = []
         if is_user_code(problem["name"], "problem"):  # whose probes were compared
             code.append(("problem", resolve_code(problem["name"], "problem", "the study")))
@@ -122,7 +122,7 @@ def _collect_code(records: Sequence[RunRecord], content: dict[str, bytes]) -> No
 
 
 def _collect_certificates(records: Sequence[RunRecord], content: dict[str, bytes]) -> None:
-    known = {find_reference(record.definition["problem"]).proven_as for record in records}
+    known = {find_reference(record.inputs.problem).proven_as for record in records}
     for name in load_certificates():
         if name in known:
             content[f"certificates/{name}.json"] = read_bytes(CERTIFICATES / f"{name}.json", "certificate")

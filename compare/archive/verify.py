@@ -6,20 +6,20 @@ from dataclasses import replace
 from functools import partial
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from compare.analysis.comparison import compare_problems, label_editions
+from compare.analysis.comparison import compare_problems
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.archive.unpack import unpack_archive
 from compare.report.study_report import make_study_document
 from compare.report.writing import render_markdown
-from compare.study.definition import SOURCE, describe_differences, is_same_definition
 from compare.study.evidence import name_record, read_evidence
-from compare.study.record import RunRecord, hash_installed_code, load_problem
+from compare.study.origin import hash_installed_code
+from compare.study.record import RunRecord, load_problem
 from compare.study.run_task import try_task
 from compare.study.settings import FILE, Manifest, read_manifest
 from compare.study.simulations import load_simulations
-from compare.study.task import Handling, ProblemSpec, Stop, Task
+from compare.study.task import SOURCE, Handling, Inputs, ProblemSpec, Stop, Task
 from nlp_gait.backends.identity import FILES
 from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError
@@ -122,7 +122,7 @@ def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> str:
         f"{name_record(record)} ({why})"
         for record, origin in own
         for holds, why in (
-            (origin.code_sha256[:8] in codes, "no session ran its code"),
+            (record.inputs.code[:8] in codes, "no session ran its code"),
             (origin.machine in machines, "no session ran on its machine"),
             (record.time_s.finished >= started, "it ended before the first session"),
         )
@@ -131,7 +131,7 @@ def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> str:
     if wrong:
         raise InputError("; ".join(wrong))
     installed = hash_installed_code()
-    other = any(origin.code_sha256 != installed for _, origin in own)
+    other = any(record.inputs.code != installed for record, _ in own)
     note = f"; other code is installed here ({installed[:8]}), so runs cannot be repeated" if other else ""
     return f"runs computed in a recorded session: {len(own)} of {len(own)}{note}"
 
@@ -146,7 +146,7 @@ def _check_certificate(path: Path) -> str:
 
 def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Finding]:
     """Compare the archived code of user-defined solvers, which is not run, with the hashes in the records."""
-    parts = [part for r in records if SOURCE in (part := r.definition["solver"])]
+    parts = [part for r in records if isinstance(part := r.inputs.solver, Mapping) and SOURCE in part]
     known = {(parse_reference(part["name"], "algorithm").short.partition(":")[0], part[SOURCE]) for part in parts}
     findings = []
     for name, digest in sorted(known):
@@ -159,7 +159,7 @@ def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Findin
 
 def _check_report(folder: Path, records: Sequence[RunRecord]) -> str:
     """Write the report again, and compare its text."""
-    comparisons = compare_problems(label_editions(records))
+    comparisons = compare_problems(records)
     simulated = load_simulations(folder, select_best_gaits(comparisons))
     document = make_study_document(comparisons, read_manifest(folder), simulated)
     again = render_markdown(document).split("\n")
@@ -173,75 +173,64 @@ def _check_report(folder: Path, records: Sequence[RunRecord]) -> str:
 def _repeat_runs(
     records: Sequence[RunRecord], share: float, places: Mapping[str, str], progress: Progress
 ) -> list[Finding]:
-    known = [record for record in records if "imported" not in record.definition and record.x]
+    known = [record for record in records if not record.inputs.imported and record.x]
     chosen = random.SystemRandom().sample(known, min(len(known), max(1, round(share * len(known)))))
     findings = []
     for record in chosen:
         progress(name_record(record))
-        repeat = partial(_repeat_run, record, _move_files(record, places), records)
+        repeat = partial(_repeat_run, record, _move_files(record, places))
         findings.append(_judge(f"repeated: {name_record(record)}", repeat))
     return findings
 
 
-def _repeat_run(record: RunRecord, moved: RunRecord, records: Sequence[RunRecord]) -> str:
-    """Repeat a run, whose files may have moved, from the run that it polishes: the same seed gives the same bits."""
+def _repeat_run(record: RunRecord, moved: RunRecord) -> str:
+    """Repeat a run, whose files may have moved: the same seed gives the same bits."""
     try:
-        task, start = _make_task(record, moved.definition), None
-        if task.polishes:
-            key = (record.problem, task.polishes, record.run)
-            start = next((r for r in records if (r.problem, r.solver, r.run) == key), None)
-            if start is None:
-                raise InputError(f"run {record.run} of {task.polishes}, which it polishes, is missing")
-        again = try_task(task, start)
+        again = try_task(_make_task(record, moved.inputs))
     except (GaitError, ValueError) as error:
         raise InputError(f"it cannot be repeated: {error}") from error
     for what in REPEATED:
-        before, now = (getattr(of, what) for of in (record, again))
+        before, now = getattr(record, what), getattr(again, what)
         if before != now and repr(before) != repr(now):  # NaN differs from itself
             raise InputError(f"its {what.replace('_', ' ')} differs: recorded {before!r:.100}, found {now!r:.100}")
     return f"the same {record.evaluations['f']} evaluations, point and history, to the last bit"
 
 
-def _make_task(record: RunRecord, definition: Mapping[str, Any]) -> Task:
-    """Return the task of a record by its definition, in which files of the problem may be elsewhere than in the record's.
+def _make_task(record: RunRecord, inputs: Inputs) -> Task:
+    """Return the task of a record by its inputs, in which files of the problem may be elsewhere than in the record's.
 
     Raises:
-        InputError: the run ended by the clock, or its solver was an object in Python.
+        InputError: the run ended by the clock, or its solver was an object in Python, or its inputs differ here.
         UserCodeError: it needs user code that the command does not name.
     """
-    solver, stored = definition["solver"], decode(StoredProblem, definition["problem"], "problem")
+    solver, stored = inputs.solver, decode(StoredProblem, inputs.problem, "problem")
     if not isinstance(solver, str):
         if "name" not in solver:
             raise InputError("its solver was an object of Python, which has no name")
         solver = resolve_code(solver["name"], "algorithm", "the run")
-    polishes = definition.get("polishes") or {}
-    stop, handling = ({**polishes, **definition}.get(key) for key in ("stop", "handling"))
-    if (stop or {}).get("time_limit_s") is not None:
+    if inputs.stop.get("time_limit_s") is not None:
         raise InputError("it ended by the clock or could have")
     name, options = resolve_stored(stored.name, stored.options, "the run")
     task = Task(
         problem=ProblemSpec(name=name, options=options, values=stored.parameters, label=record.problem),
         solver=solver,
-        settings=definition["settings"],
-        handling=decode(Handling, handling) if handling else Handling(),
-        stop=decode(Stop, stop) if stop else Stop(),
+        settings=inputs.settings,
+        handling=inputs.handling or Handling(),
+        stop=decode(Stop, inputs.stop),
         seed=record.seed - record.run if record.seed >= record.run else record.seed,
         run=record.run if record.seed >= record.run else 0,
         label=record.solver,
-        polishes=polishes.get("solver", ""),
-        start=definition.get("start") or {},
+        polish=inputs.polish,
+        start=inputs.start,
     )
-    own, wanted = task.definition(), dict(record.definition)
-    if polishes:  # its key is of the search, whose record is compared
-        wanted["polishes"] = {key: value for key, value in polishes.items() if key != "key"}
-    if not is_same_definition(own, wanted):
-        raise InputError(f"it has another definition here: {describe_differences(wanted, own)}")
+    if task.inputs().key != record.inputs.key:
+        raise InputError("its solver, code or problem is another one here")
     return task
 
 
 def _move_files(record: RunRecord, places: Mapping[str, str]) -> RunRecord:
     """Return a record whose problem reads its files at other places."""
-    problem = record.definition["problem"]
+    problem = record.inputs.problem
     moved = {option: places.get(str(problem["options"][option])) for option in problem.get(FILES, ())}
     options = {**problem["options"], **{option: place for option, place in moved.items() if place}}
-    return replace(record, definition={**record.definition, "problem": {**problem, "options": options}})
+    return replace(record, inputs=replace(record.inputs, problem={**problem, "options": options}))

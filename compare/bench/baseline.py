@@ -8,17 +8,17 @@ import lzma
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from compare.analysis.best_known import is_zero
 from compare.analysis.record_statistics import ECDF_TARGETS
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.task import GRADIENT_SOLVERS, ProblemSpec, Stop
+from compare.study.task import GRADIENT_SOLVERS, Handling, Inputs, ProblemSpec, Stop
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError
 from nlp_gait.gaitbench.facts import Subset
@@ -141,14 +141,14 @@ def load_baseline(instance: str) -> tuple[RunRecord, ...]:
 def make_record(row: BaselineRun) -> RunRecord:
     """Return the record of a run of the baseline."""
     problem = gaitbench.load(row.instance).gait_problem
-    definition: dict[str, Any] = {
-        "problem": {"name": "gaitbench", "options": {"instance": row.instance}, "parameters": {}},
-        "objective": asdict(problem.objective),
-        "solver": row.solver,
-        "seed": row.run,
-    }
-    if row.solver not in GRADIENT_SOLVERS:
-        definition["handling"] = {"name": "deb", "settings": {}}
+    inputs = Inputs(
+        problem={"name": "gaitbench", "options": {"instance": row.instance}, "parameters": {}},
+        objective=problem.objective,
+        solver=row.solver,
+        settings={},
+        seed=row.run,
+        handling=None if row.solver in GRADIENT_SOLVERS else Handling(),
+    )
     reference = get_reference(row.instance)
     unit = problem.objective.sign * (1.0 if is_zero(reference) else abs(reference))
     gaps = {time: target * BELOW for time, target in zip(row.times, ECDF_TARGETS, strict=False)}
@@ -160,8 +160,7 @@ def make_record(row: BaselineRun) -> RunRecord:
         problem=row.instance,
         solver=row.solver,
         run=row.run,
-        seed=row.run,
-        definition=definition,
+        inputs=inputs,
         settings={},
         status="",
         claimed=row.in_history,

@@ -203,13 +203,13 @@ def summarise_problems(records: Sequence[RunRecord]) -> dict[str, Any]:
     return {comparison.problem: summarise(comparison) for comparison in compare_problems(records)}
 
 
-ENCODED = "problem solver run seed claimed_objective claimed_violation failed_evaluations status x verdict".split()
+ENCODED = "problem solver run claimed_objective claimed_violation failed_evaluations status x verdict".split()
 
 
 def _encode_run(record: RunRecord) -> dict[str, Any]:
     plain = record.to_json()
     costs = {"evaluations": plain["evaluations"]["f"], "time_s": plain["time_s"]["solve"]}
-    return {**{key: plain[key] for key in ENCODED}, **costs}
+    return {**{key: plain[key] for key in ENCODED}, "seed": record.seed, **costs}
 
 
 def _tabulate_runs(records: Sequence[RunRecord]) -> Iterator[Rows]:

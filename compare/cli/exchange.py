@@ -5,7 +5,6 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from compare.analysis.comparison import label_editions
 from compare.archive import pack_study, verify_archive, verify_folder
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
 from compare.cli.compare import describe_summaries, list_excluded, summarise_problems
@@ -15,10 +14,9 @@ from compare.cli.printing import Output, show_progress
 from compare.report import write_report
 from compare.study.evidence import read_evidence
 from compare.study.import_runs import import_runs
-from compare.study.record_files import write_record
+from compare.study.record_files import write_records
 from compare.study.settings import read_manifest
 from nlp_gait.errors import InputError
-from nlp_gait.files import make_writable_folder
 
 FINALS = "One row per run: the variables, and where known run, seed, objective, violation, evaluations, time_s."
 HISTORY = "Best so far: run, evaluations, objective and optionally time_s."
@@ -43,11 +41,10 @@ def import_results(
     """
     spec = problem.spec()
     records = import_runs(spec, finals, label, history, evaluations)
-    kept = [write_record(record, make_writable_folder(out)) for record in records]
+    kept = write_records(records, out)
     evidence = read_evidence(out)
-    everything = label_editions(evidence.records)
-    report = write_report(out, everything, read_manifest(out), excluded=evidence.excluded)
-    shown = [record for record in everything if record.problem == spec.title]
+    report = write_report(out, evidence.records, read_manifest(out), excluded=evidence.excluded)
+    shown = [record for record in evidence.records if record.problem == spec.title]
     return Output(
         data={"problems": summarise_problems(shown)},
         parts=list(describe_summaries(shown)),
@@ -95,6 +92,6 @@ def _pack(folder: Path, target: Path) -> Output:
     failures = list_excluded(evidence.sentences)
     if failures:
         return Output(data={"records": 0}, failures=failures)
-    write_report(folder, label_editions(evidence.records), read_manifest(folder))
+    write_report(folder, evidence.records, read_manifest(folder))
     written = [pack_study(folder, evidence.records, target)]
     return Output(data={"records": len(evidence.records)}, written=written)

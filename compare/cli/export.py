@@ -11,6 +11,7 @@ from compare.cli.command import OUTPUT_FILE, command, report_interrupts
 from compare.cli.options import Code, Limits, ProblemOptions, Values, name_all
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import Output
+from compare.study.record import load_result_or_record
 from compare.study.references import find_reference
 from nlp_gait import gaitbench
 from nlp_gait.backends.identity import identify_problem
@@ -19,7 +20,6 @@ from nlp_gait.export.formats import FORMATS, PERIOD_MS, write_as
 from nlp_gait.export.nl_file import export_nl
 from nlp_gait.export.solver import export_solver
 from nlp_gait.formulation import Result
-from nlp_gait.formulation.result import load_result
 from nlp_gait.gaitbench.c_export import export_objective
 from nlp_gait.simulation.video import check_frames, check_video_path, write_video
 
@@ -65,7 +65,7 @@ def export(
     if changes != ProblemOptions():
         raise InputError(f"--to {to} writes a stored gait with its own options and values; leave out --set and --limit")
     ending, write = GAITS[to]
-    result, path = load_result(Path(source)), Path(source)
+    result, path = load_result_or_record(Path(source)), Path(source)
     target = check_output_file(out or path.with_name(path.stem + ending))
     with report_interrupts():
         write(target, result, period_ms)

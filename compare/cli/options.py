@@ -9,11 +9,11 @@ from typing import Annotated, Any
 from typer import Argument, Option
 
 from compare.cli.command import OUTPUT, SESSION
+from compare.study.record import load_result_or_record
 from compare.study.task import ProblemSpec
 from nlp_gait.errors import InputError, describe_type, unknown
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.formulation.registry import find_maker
-from nlp_gait.formulation.result import load_result
 from nlp_gait.user_code import allow_code, is_reference
 
 RESULTS = Path("results")  # default folder
@@ -57,9 +57,9 @@ class StoredGait:
     code: Code = None
 
     def load(self) -> Result:
-        """Return the gait; raises as ``load_result``, and InputError for code that is not a reference."""
+        """Return the gait; raises as ``load_result_or_record``, and InputError for code that is not a reference."""
         name_all(self.code)
-        return load_result(self.result)
+        return load_result_or_record(self.result)
 
 
 @dataclass(frozen=True, kw_only=True)

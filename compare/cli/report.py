@@ -8,7 +8,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from compare.analysis.comparison import compare_problems, label_editions
+from compare.analysis.comparison import compare_problems
 from compare.analysis.failures import describe_unknown
 from compare.analysis.record_statistics import Weighting
 from compare.analysis.simulated_gaits import (
@@ -82,7 +82,7 @@ def report(
         say(f"open {folder / 'report.html'}; it follows the study in {folder} until Ctrl-C")
         watch_report(folder, lambda: rebuild_report(folder, weighting))
     evidence, manifest = read_evidence(folder), read_manifest(folder)
-    records = label_editions(evidence.records)
+    records = evidence.records
     simulated = _simulate_best(folder, records) if engine else []
     further = FurtherFiles(csv=csv, latex=latex, figures=figures)
     written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
@@ -123,7 +123,7 @@ def reproduce(
 ) -> Output:
     """Recompute a paper's tables and figures next to the printed ones, and check its claims.
 
-    `claims.csv` has every claim with its verdict, `differences.csv` everything that is not as printed with its effect.
+    `claims.csv` has every claim with its verdict, `differences.csv` evidence.records that is not as printed with its effect.
 
     Examples: `nlp-gait reproduce nao --out reproduction`, `nlp-gait reproduce walk12 --quick --out quick`,
     `nlp-gait reproduce stairs --effort effort.json --out reduced`

@@ -217,7 +217,7 @@ class Paper(Generic[E, R]):
         ending = Section(
             title="Versions, machine, seeds and settings", parts=(*origin, make_session_section(1, session))
         )
-        cited = make_citation_section(record.definition["problem"] for record in runner.records)
+        cited = make_citation_section(record.inputs.problem for record in runner.records)
         title = self.title if label == "full" else f"{self.title} ({label})"
         write_document(folder, Document(title=title, headline=[count_verdicts(found)], parts=(*parts, ending, cited)))
         return record

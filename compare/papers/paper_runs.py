@@ -13,7 +13,6 @@ import numpy as np
 from compare.study.record import RunRecord
 from compare.study.record_files import locate_record
 from compare.study.run_study import Study, run_study
-from compare.study.run_task import Run, run_task
 from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from metaheuristics.interface import Algorithm
@@ -48,13 +47,13 @@ class Runner:
     on_outdated: Progress = ignore_progress  # receives a line for each solver whose stored runs are recomputed
     records: list[RunRecord] = field(default_factory=list)  # of all tasks, filled by ``run_tasks``
 
-    def run_tasks(self, tasks: Iterable[Task], run: Run = run_task) -> Runs:
-        """Run tasks with different titles by a function that performs one run, and return their records.
+    def run_tasks(self, tasks: Iterable[Task]) -> Runs:
+        """Run tasks with different titles, and return their records.
 
         Raises:
-            InputError: a run failed before it had a point, or the folder holds runs of other tasks.
+            InputError: a run failed before it had a point.
         """
-        study = Study(tasks=tuple(tasks), folder=self.folder, jobs=self.jobs, scheduler=self.scheduler, run=run)
+        study = Study(tasks=tuple(tasks), folder=self.folder, jobs=self.jobs, scheduler=self.scheduler)
 
         def report_stored(count: int) -> None:
             for _ in range(count):
@@ -111,7 +110,7 @@ def choose_best(records: Iterable[RunRecord]) -> RunRecord:
 
     def rank(record: RunRecord) -> tuple[bool, bool, float]:
         verdict = record.verdict
-        sign = 1.0 if record.definition["objective"]["sense"] == "minimise" else -1.0
+        sign = record.inputs.objective.sign
         by = sign * verdict.objective if verdict.feasible else verdict.violation
         return not record.claimed, not verdict.feasible, by
 

@@ -225,7 +225,7 @@ def _run_searches(tasks: Sequence[Task], work: Work) -> list[RunRecord]:
     records: list[RunRecord] = []
     try:
         for task in tasks:
-            record = work.store.compute("search", task.definition(), partial(_run_search, task))
+            record = work.store.compute("search", asdict(task.inputs()), partial(_run_search, task))
             records.append(parse_record(record))
             work.progress("")
     except KeyboardInterrupt:

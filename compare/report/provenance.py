@@ -6,14 +6,13 @@ from functools import cache
 from typing import Any
 
 from compare.analysis.best_known import compute_gap
-from compare.analysis.comparison import read_objective
 from compare.analysis.record_statistics import find_best_known
 from compare.analysis.units import format_percent, with_unit
 from compare.report.document import Prose, Table, make_text_table
 from compare.study.description import describe_solver, list_described_names
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
-from compare.study.task import GRADIENT_SOLVERS, describe_settings, list_solvers
+from compare.study.task import GRADIENT_SOLVERS, IPOPT, describe_settings, list_solvers
 from metaheuristics.errors import SearchError
 from metaheuristics.registry import ALGORITHMS, make_algorithm
 from nlp_gait.backends.identity import hash_json, make_key
@@ -44,7 +43,7 @@ def make_solver_table(records: Iterable[RunRecord]) -> Table:
     """Return settings, budget and seeds of the solvers of all records, a row for each difference."""
     groups: dict[tuple[str, str, str], list[RunRecord]] = {}
     for record in records:
-        key = record.solver, format_settings(record.definition["settings"]), describe_budget(record)
+        key = record.solver, format_settings(record.inputs.settings), describe_budget(record)
         groups.setdefault(key, []).append(record)
     rows = []
     for (solver, *_), group in groups.items():
@@ -60,10 +59,10 @@ def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
     """Return the best of the records next to the shipped best known value, a row for each problem that has one."""
     groups: dict[str, list[RunRecord]] = {}
     for record in records:
-        groups.setdefault(hash_json(make_key(record.definition["problem"])), []).append(record)
+        groups.setdefault(hash_json(make_key(record.inputs.problem)), []).append(record)
     rows = []
     for group in groups.values():
-        known, objective = find_reference(group[0].definition["problem"]), read_objective(group[0])
+        known, objective = find_reference(group[0].inputs.problem), group[0].inputs.objective
         best = find_best_known(group, objective)
         if known.objective is not None:
             gap = format_percent(compute_gap(best, known.objective, objective))
@@ -87,7 +86,9 @@ def compare_with_defaults(record: RunRecord) -> tuple[str, str, str]:
     if isinstance(handling, Mapping):
         settings["constraint handling"] = handling.get("kind") if handling.keys() == {"kind"} else handling
         defaults = {**defaults, "constraint handling": "Deb"}
-    given = record.definition["settings"]
+    if record.inputs.polish:
+        defaults = {**defaults, IPOPT: _load_defaults(IPOPT)}
+    given = record.inputs.settings
     changed = {
         name: value
         for name, value in settings.items()
@@ -105,19 +106,17 @@ def compare_with_defaults(record: RunRecord) -> tuple[str, str, str]:
 
 def describe_budget(record: RunRecord) -> str:
     """Return the number of evaluations that a run was allowed."""
-    stop = record.definition.get("stop") or {}
-    return f"{stop['evaluations']:,}".replace(",", "\u202f") if stop.get("evaluations") else "no limit"
+    budget = record.inputs.stop.get("evaluations")
+    return f"{budget:,}".replace(",", "\u202f") if budget else "no limit"
 
 
 def _find_defaults(record: RunRecord) -> Mapping[str, Any] | None:
     """Return the default settings of a run's solver; None for user code and imported results."""
-    solver = record.definition.get("solver")
-    if "polishes" in record.definition:
-        solver = GRADIENT_SOLVERS[0]
+    solver: str | Mapping[str, Any] | None = record.inputs.solver
     if isinstance(solver, Mapping):  # settings of a search, by its class
         kind = solver.get("kind")
         solver = next((name for name in ALGORITHMS if _load_defaults(name).get("kind") == kind), None)
-    known = isinstance(solver, str) and solver in list_solvers() and "imported" not in record.definition
+    known = isinstance(solver, str) and solver in list_solvers() and not record.inputs.imported
     return (_load_defaults(str(solver)) or None) if known else None
 
 

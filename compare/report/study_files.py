@@ -59,7 +59,7 @@ def make_runs_table(comparisons: Sequence[Comparison]) -> TableRows:
     for comparison in comparisons:
         for solver in comparison.solvers:
             for record, curve, cost in zip(solver.records, solver.curves, solver.costs, strict=True):
-                budget = (record.definition.get("stop") or {}).get("evaluations")
+                budget = record.inputs.stop.get("evaluations")
                 measured = (len(record.x) or None, budget, comparison.gap(cost), curve.total_cost())
                 reached = (curve.cost_to_reach(target, axis) for axis in COSTS for target in TARGETS)
                 rows.append((*make_row(record), *measured, *reached))
@@ -150,7 +150,7 @@ def escape_latex(text: str) -> str:
 def describe_run_counts(comparison: Comparison) -> str:
     """Return for example "n = 20 runs of each solver, at most 10,000 evaluations of a search"."""
     runs = sorted({len(solver.records) for solver in comparison.solvers})
-    stops = [record.definition.get("stop") or {} for record in comparison.records]
+    stops = [record.inputs.stop for record in comparison.records]
     budgets = sorted({stop["evaluations"] for stop in stops if "evaluations" in stop})
     count = " to ".join(map(str, dict.fromkeys((runs[0], runs[-1]))))
     budget = f", at most {join_words(f'{each:,}' for each in budgets)} evaluations of a search" if budgets else ""

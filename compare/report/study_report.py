@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems, label_editions
+from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
 from compare.analysis.headline import MANY, write_headlines
 from compare.analysis.record_statistics import Weighting
 from compare.analysis.simulated_gaits import select_best_gaits
@@ -41,7 +41,7 @@ def rebuild_report(
 ) -> list[Path]:
     """Rewrite the report of all records of a folder, earlier ones included; return its files. Raises as ``read_evidence``."""
     evidence = read_evidence(folder)
-    records, manifest = label_editions(evidence.records), read_manifest(folder)
+    records, manifest = evidence.records, read_manifest(folder)
     return write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
 
 

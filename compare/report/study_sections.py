@@ -197,7 +197,7 @@ def make_settings_section(comparisons: Sequence[Comparison], sessions: Sequence[
         (c.problem, *map("{:g}".format, c.weighting.of_kind(n).values()))
         for c, n in zip(comparisons, sizes, strict=True)
     ]
-    problems = {c.problem: c.records[0].definition["problem"] for c in comparisons}
+    problems = {c.problem: c.records[0].inputs.problem for c in comparisons}
     options = [
         (name, format_settings(problem["parameters"]) or "none", format_settings(problem["options"]))
         for name, problem in problems.items()

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from compare.study.record import RunRecord
-from compare.study.run_task import MOST_REASON, Run, try_task
+from compare.study.run_task import MOST_REASON, try_task
 from compare.study.task import Task
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import convert_errors
@@ -12,12 +12,9 @@ from nlp_gait.user_code import Kind, PackedCode, is_user_code, pack_code, unpack
 
 CONNECT_TIMEOUT = "10s"
 
-Job = tuple[Task, RunRecord | None]
-"""A task, and the run that it polishes, if it does."""
 
-
-def run_on_cluster(jobs: Mapping[int, Job], scheduler: str, run: Run) -> Iterator[tuple[int, RunRecord]]:
-    """Run jobs on the workers of a scheduler, and yield the key and the record of each as it finishes.
+def run_on_cluster(tasks: Mapping[int, Task], scheduler: str) -> Iterator[tuple[int, RunRecord]]:
+    """Run tasks on the workers of a scheduler, and yield the key and the record of each as it finishes.
 
     The scheduler repeats the runs of a worker that dies.
 
@@ -34,10 +31,10 @@ def run_on_cluster(jobs: Mapping[int, Job], scheduler: str, run: Run) -> Iterato
         logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are reported in one sentence
     with convert_errors(f"no Dask scheduler answers at {scheduler!r}", InputError, "start one with `dask scheduler`"):
         client = Client(scheduler, timeout=CONNECT_TIMEOUT)
-    code = _pack_code(task for task, _ in jobs.values())
+    code = _pack_code(tasks.values())
     with client:
         try:
-            futures = {client.submit(_try_task, code, *job, run, pure=False): key for key, job in jobs.items()}
+            futures = {client.submit(_try_task, code, task, pure=False): key for key, task in tasks.items()}
             for future in as_completed(futures):
                 yield futures[future], future.result()
         except Exception as error:  # of Dask, or of the worker's own Python, which may lack a package
@@ -48,10 +45,10 @@ def run_on_cluster(jobs: Mapping[int, Job], scheduler: str, run: Run) -> Iterato
             ) from error
 
 
-def _try_task(code: Sequence[PackedCode], task: Task, start: RunRecord | None, run: Run) -> RunRecord:
+def _try_task(code: Sequence[PackedCode], task: Task) -> RunRecord:
     for packed in code:
         unpack_code(packed)
-    return try_task(task, start, run)
+    return try_task(task)
 
 
 def _pack_code(tasks: Iterable[Task]) -> tuple[PackedCode, ...]:

@@ -7,28 +7,35 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from compare.judge import evaluate
-from compare.study.definition import select_shared
-from compare.study.record import RunRecord, Verdict, hash_installed_code, load_problem
+from compare.study.origin import hash_installed_code
+from compare.study.record import RunRecord, Verdict, load_problem
 from compare.study.record_files import read_each
 from compare.study.references import SAME_VALUE, find_reference
-from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.exact import ExactValues, build_exact_model
 from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import GaitError, InputError
-from nlp_gait.formulation import Array, GaitProblem, Objective
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
 # Up to this many points of a problem are evaluated by CasADi, a third of a millisecond each; more by the compiled objective.
 MOST_INTERPRETED = 1000
 # A total violation of up to 1e-6 may improve the objective by up to this much, relatively.
 SLACK = 1e-4
+# Relative difference of the last value of a history from the judged one: exact for searches, lifted for NLP solvers, and rounded
+# for imported runs.
+END_OF_SEARCH, END_OF_SOLVER, END_OF_IMPORT = 1e-9, 1e-5, 1e-3
+# Reason by which every search ends whose budget is used, see ``metaheuristics.minimize``.
+BUDGET_USED = "evaluation budget used"
+# Histories with at least this many different values are never equal by chance.
+TELLING = 3
 
 
 class Exclusion(NamedTuple):
@@ -59,6 +66,24 @@ class CheckedRecords(NamedTuple):
         return [exclusion.sentence for exclusion in self.excluded]
 
 
+@dataclass(kw_only=True)
+class Context:
+    """What a record is compared with."""
+
+    problem: GaitProblem | None = None  #: None if it cannot be loaded
+    objections: list[str] = field(default_factory=list)  #: to the problem or the point, which prevent an evaluation
+    objective: float | None = None  #: at its x, by the compiled functions or else as ``exact``; None if not evaluated
+    violation: float = math.nan  #: likewise
+    indexes: Mapping[str, float] | None = None  #: of the interpreted functions; None if the compiled ones agree
+    bound: float | None = None  #: proven: no feasible point has a better objective
+    first: Mapping[str, RunRecord] = field(default_factory=dict)  #: with the same mark, see ``_list_marks``
+    code: tuple[str, str] | None = None  #: hash of the code, and version of CasADi, of most records
+
+
+Check = Callable[[RunRecord, Context], str | None]
+"""Returns what is wrong with a record; None if nothing is."""
+
+
 def check_records(
     records: Sequence[RunRecord],
     *,
@@ -73,48 +98,31 @@ def check_records(
         between_samples: for which runs the verdict between the samples is repeated, a tenth of a second each: for the best one of
             every solver, all or none.
     """
-    reasons: Reasons = [[] for _ in records]
-    for group in group_by(records, lambda r: hash_json(r.definition["problem"])):
-        own, wrong = [records[k] for k in group], [reasons[k] for k in group]
-        try:
-            problem = (find_problem or load_problem)(own[0])
-        except (GaitError, ValueError) as error:
-            for why in wrong:
-                why.append(f"its problem cannot be evaluated: {error}")
-            continue
-        _check_points(problem, own, wrong)
-        _check_bound(problem.objective, own, wrong)
-        _check_between_samples(problem, own, wrong, between_samples)
-    for record, why in zip(records, reasons, strict=True):
-        why += check_history(record)
-        why += check_claims(record)
-    find_copies(records, reasons)
-    check_code(records, reasons)
-    evidence = CheckedRecords([], [])
-    for record, why in zip(records, reasons, strict=True):
-        if why:
-            evidence.excluded.append(Exclusion(name_record(record), tuple(why), record))
-        else:
-            evidence.records.append(record)
-    return evidence
+    contexts = _make_contexts(records, find_problem or load_problem)
+    pairs = list(zip(records, contexts, strict=True))
+    reasons = [[reason for check in CHECKS if (reason := check(*pair))] for pair in pairs]
+    for k in _choose_runs(pairs, reasons, between_samples):
+        reasons[k] += [reason] if (reason := check_between_samples(*pairs[k])) else []
+    excluded = [Exclusion(name_record(r), tuple(why), r) for r, why in zip(records, reasons, strict=True) if why]
+    return CheckedRecords([record for record, why in zip(records, reasons, strict=True) if not why], excluded)
 
 
 def read_evidence(
     folder: Path, between_samples: Scope = "best", find_problem: Callable[[RunRecord], GaitProblem] | None = None
 ) -> CheckedRecords:
-    """Read and check all records of a folder, those of other definitions last.
+    """Read and check the records of a study.
 
     Raises:
         InputError: there are no records, or none of them can be used.
     """
-    found = read_each(folder)
-    readable = [record for _, record in found if isinstance(record, RunRecord)]
+    files = read_each(folder)
+    readable = [record for _, record in files if isinstance(record, RunRecord)]
     evidence = check_records(readable, find_problem=find_problem, between_samples=between_samples)
-    damaged = [(path, error) for path, error in found if isinstance(error, InputError)]
+    damaged = [(path, error) for path, error in files if isinstance(error, InputError)]
     evidence.excluded[:0] = [Exclusion(path.relative_to(folder).as_posix(), (str(error),)) for path, error in damaged]
     if not evidence.records:
         sentences = "; ".join(evidence.sentences)
-        raise InputError(f"none of the {len(found)} records in {str(folder)!r} can be used: {sentences}")
+        raise InputError(f"none of the {len(files)} records in {str(folder)!r} can be used: {sentences}")
     return evidence
 
 
@@ -123,118 +131,12 @@ def name_record(record: RunRecord) -> str:
     return f"{record.problem}, {record.solver}, run {record.run}"
 
 
-def _check_points(problem: GaitProblem, records: Sequence[RunRecord], reasons: "Reasons") -> None:
-    """Compare objective, violation, feasibility and indexes with the exact functions at x."""
-    identity, described = identify_problem(problem), asdict(problem.objective)
-    points: dict[int, Array] = {}
-    for k, (record, why) in enumerate(zip(records, reasons, strict=True)):
-        if difference := describe_difference(record.definition["problem"], identity):
-            why.append(f"its problem has changed since: {difference}")
-        if record.definition["objective"] != described:
-            why.append(f"its objective is {record.definition['objective']}, that of the problem {described}")
-        if not record.x:
-            why += _check_failed(record)
-            continue
-        try:
-            points[k] = problem.check_x(record.x)
-        except (GaitError, ValueError) as error:
-            why.append(f"its point does not belong to the problem: {error}")
-    if len(points) > MOST_INTERPRETED:
-        costs, violations = compile_objective(problem)(np.array(list(points.values())))
-        for k, cost, violation in zip(list(points), costs.tolist(), violations.tolist(), strict=True):
-            if not any(_compare_verdict(records[k].verdict, problem.objective.sign * cost, violation)):
-                del points[k]  # what remains is decided by the interpreted functions
-    for k, x in points.items():
-        exact = build_exact_model(problem).at(x, problem.p)
-        objective = problem.objective.sign * exact.cost
-        reasons[k] += _compare_verdict(records[k].verdict, objective, exact.violation, exact.indexes)
-
-
-def _compare_verdict(
-    verdict: Verdict, objective: float, violation: float, indexes: Mapping[str, float] | None = None
-) -> Iterator[str]:
-    if not is_same(verdict.objective, objective):
-        yield f"its objective is {verdict.objective:.9g}, but that of its x is {objective:.9g}"
-    violation = math.inf if math.isnan(violation) else violation
-    if not is_same(verdict.violation, violation, 1.0):
-        yield f"its violation is {verdict.violation:.3g}, but that of its x is {violation:.3g}"
-    if verdict.feasible != (verdict.violation <= FEASIBILITY_TOLERANCE):
-        yield f"it is called {'feasible' if verdict.feasible else 'infeasible'} with a violation of {verdict.violation:.3g}"
-    if indexes is not None and verdict.indexes:
-        if verdict.indexes.keys() != indexes.keys():
-            yield "its indexes have other names than those of the problem"
-        for name in verdict.indexes.keys() & indexes.keys():
-            if not is_same(verdict.indexes[name], indexes[name], 1.0):
-                yield f"its index {name} is {verdict.indexes[name]:.9g}, but that of its x is {indexes[name]:.9g}"
-
-
-def _check_failed(record: RunRecord) -> Iterator[str]:
-    verdict = record.verdict
-    if verdict.feasible or math.isfinite(verdict.objective) or verdict.indexes or verdict.dense or verdict.guaranteed:
-        yield "it has a verdict, but no point"
-
-
-def _check_bound(objective: Objective, records: Sequence[RunRecord], reasons: "Reasons") -> None:
-    """Find feasible objectives that no feasible point can have."""
-    bound = find_reference(records[0].definition["problem"]).bound
-    if bound is None:
-        return
-    for record, why in zip(records, reasons, strict=True):
-        verdict = record.verdict
-        slack = SAME_VALUE if verdict.violation == 0.0 else SLACK
-        if verdict.feasible and objective.sign * (bound - verdict.objective) > slack * abs(bound):
-            why.append(f"its objective {verdict.objective:.9g} is better than the proven bound {bound:.9g}")
-
-
-def _check_between_samples(
-    problem: GaitProblem, records: Sequence[RunRecord], reasons: "Reasons", scope: Scope
-) -> None:
-    """Judge points again as a run does, with the dense grid and the guarantee: all, or the best one of every solver."""
-    chosen = list(range(len(records))) if scope == "all" else []
-    if scope == "best":
-        cost = [problem.objective.sign * r.verdict.objective if r.verdict.feasible else math.inf for r in records]
-        chosen = [min(own, key=lambda k: cost[k]) for own in group_by(records, lambda r: r.solver)]
-        chosen = [k for k in chosen if math.isfinite(cost[k])]
-    for k in chosen:
-        if reasons[k] or not records[k].x:
-            continue
-        known, found = records[k].verdict, Verdict.from_evaluation(evaluate(problem, problem.check_x(records[k].x)))
-        if known.dense_feasible != found.dense_feasible or not _are_same(known.dense, found.dense):
-            reasons[k].append("its verdict on the dense grid does not follow from its x")
-        if _describe_guarantee(known) != _describe_guarantee(found):
-            reasons[k].append(
-                f"guaranteed between the samples: recorded {_describe_guarantee(known)}, found {_describe_guarantee(found)}"
-            )
-
-
-def _are_same(a: Mapping[str, float] | None, b: Mapping[str, float] | None) -> bool:
-    if a is None or b is None:
-        return a is b
-    return a.keys() == b.keys() and all(is_same(a[name], b[name], 1.0) for name in a)
-
-
-def _describe_guarantee(verdict: Verdict) -> str:
-    return "nothing" if verdict.guaranteed is None else verdict.guaranteed.word
-
-
-Reasons = list[list[str]]
-"""What is wrong with each record."""
-
-# Relative difference of the last value of a history from the judged one: exact for searches, lifted for NLP solvers, and rounded
-# for imported runs.
-END_OF_SEARCH, END_OF_SOLVER, END_OF_IMPORT = 1e-9, 1e-5, 1e-3
-# Reason by which every search ends whose budget is used, see ``metaheuristics.minimize``.
-BUDGET_USED = "evaluation budget used"
-# Histories with at least this many different values are never equal by chance.
-TELLING = 3
-
-
 def group_by(records: Sequence[RunRecord], key: Callable[[RunRecord], object]) -> list[list[int]]:
     """Return the positions of records with equal keys."""
-    found: dict[object, list[int]] = {}
+    groups: dict[object, list[int]] = {}
     for k, record in enumerate(records):
-        found.setdefault(key(record), []).append(k)
-    return list(found.values())
+        groups.setdefault(key(record), []).append(k)
+    return list(groups.values())
 
 
 def is_same(a: float, b: float, scale: float = 0.0) -> bool:
@@ -244,101 +146,298 @@ def is_same(a: float, b: float, scale: float = 0.0) -> bool:
     return abs(a - b) <= SAME_VALUE * max(abs(a), abs(b), scale)
 
 
-def check_history(record: RunRecord) -> Iterator[str]:
-    """Check that the best so far never worsens and ends at the judged value, and that times ascend."""
-    history, definition, times = record.history, record.definition, record.time_s
-    is_search = "handling" in definition
-    known = [value for value in history.objective if value is not None]
-    if any(not math.isfinite(value) for value in known):
-        yield "its history has a value that is not finite"
-    sign = 1.0 if definition["objective"]["sense"] == "minimise" else -1.0
-    if is_search and any(sign * (b - a) > 0.0 for a, b in itertools.pairwise(known)):
-        yield "the best value of its history worsens"
-    if is_search and None in history.objective[len(history.objective) - len(known) :]:
-        yield "its history loses a feasible point"
-    if is_search and record.claimed != bool(known):
-        yield "its claim and its history disagree on whether a feasible point was found"
-    last = history.objective[-1] if history.objective else None
-    if last is not None:
-        judged = record.verdict.objective
-        tolerance = END_OF_SEARCH if is_search else END_OF_IMPORT if "imported" in definition else END_OF_SOLVER
-        if not abs(last - judged) <= tolerance * max(abs(last), abs(judged)):
-            yield f"its history ends at {last:.9g}, but the judge finds {judged:.9g}"
-    counts = history.evaluations
-    if is_search and any(a >= b for a, b in itertools.pairwise((0, *counts))):
-        yield "its history has two entries at the same number of evaluations"
-    if is_search and len(counts) > record.iterations:
-        yield f"its history has {len(counts)} entries, more than its {record.iterations} iterations"
-    if any(a > b for a, b in itertools.pairwise((0.0, *times.history))):
-        yield "the times of its history do not ascend from 0"
-    if any(value < 0.0 for value in (times.build, times.compile, times.solve, times.objective)):
-        yield "it has a negative time"
-    if times.history and times.history[-1] > times.solve * (1.0 + SAME_VALUE):
-        yield "its history is longer than its run"
-
-
-def check_claims(record: RunRecord) -> Iterator[str]:
-    """Check claims and counts, which a run derives from the same functions as the judge; imported claims are anything."""
-    definition, verdict = record.definition, record.verdict
-    if "imported" in definition:
-        return
-    f = record.evaluations["f"]
-    claim, is_search = record.claimed_objective, "handling" in definition
-    if claim is not None and not is_same(claim, verdict.objective):
-        yield f"it claims {claim:.9g}, but the judge finds {verdict.objective:.9g}"
-    if is_search and record.claimed_violation is not None:
-        if not is_same(record.claimed_violation, verdict.violation, 1.0):
-            yield f"it claims a violation of {record.claimed_violation:.3g}, but the judge finds {verdict.violation:.3g}"
-        if record.claimed != (record.claimed_violation == 0.0):
-            yield "it claims a feasible point with a violation, or none without"
-    budget = (definition.get("stop") or {}).get("evaluations")
-    if is_search and budget is not None and f > budget:
-        yield f"it counts {f} evaluations, more than its budget of {budget}"
-    if is_search and budget is not None and (f == budget) != (BUDGET_USED in record.status.split("; ")):
-        yield f"it counts {f} of {budget} evaluations, but ended by: {record.status}"
-    counted = record.history.evaluations[-1] if record.history.evaluations else f
-    if counted > f or (is_search and counted != f):
-        yield f"its history ends after {counted} evaluations, but it counts {f}"
-    if max(record.failed_evaluations, record.iterations if is_search else 0) > f:
-        yield f"it counts more failed evaluations or iterations than its {f} evaluations"
-
-
-def find_copies(records: Sequence[RunRecord], reasons: Reasons) -> None:
-    """Find runs that count twice: with the seed, all times or the whole history of an earlier run of the same problem."""
-    order = sorted(range(len(records)), key=lambda k: records[k].run)
-    seen: dict[object, RunRecord] = {}
-    for k in order:
-        record, why = records[k], reasons[k]
-        solver = record.problem, record.solver, hash_json(select_shared(record.definition))
-        first = seen.setdefault(("seed", *solver, record.seed), record)
-        if first is not record:
-            why.append(f"its seed {record.seed} repeats that of run {first.run}")
-        if "imported" in record.definition:
+def _make_contexts(records: Sequence[RunRecord], find_problem: Callable[[RunRecord], GaitProblem]) -> list[Context]:
+    """Load each problem once, and evaluate all of its points."""
+    contexts = [Context() for _ in records]
+    for group in group_by(records, lambda record: hash_json(record.inputs.problem)):
+        stored = records[group[0]].inputs.problem
+        try:
+            problem = find_problem(records[group[0]])
+            difference = describe_difference(stored, identify_problem(problem))
+            bound = find_reference(stored).bound
+        except (GaitError, ValueError) as error:
+            for k in group:
+                contexts[k].objections.append(f"its problem cannot be evaluated: {error}")
             continue
-        marks: list[object] = [("settings", *solver)]
-        if record.time_s.solve > 0.0:
-            marks.append(("times", record.problem, record.time_s.solve, *record.time_s.history))
-        if "handling" in record.definition and len(set(record.history.objective)) >= TELLING:
-            marks.append(("history", *solver, *record.history.objective, *record.history.evaluations))
-        for mark in marks:
-            first = seen.setdefault(mark, record)
-            if first is record:
-                continue
-            if mark is not marks[0]:
-                why.append(f"it is a copy of {first.solver}, run {first.run}, with all its times or its whole history")
-            elif "handling" in record.definition and record.x and first.x and record.settings != first.settings:
-                why.append(f"its settings are not those of run {first.run}")
+        for k in group:
+            contexts[k].problem, contexts[k].bound = problem, bound
+            contexts[k].objections += [f"its problem has changed since: {difference}"] if difference else []
+        _evaluate_points(problem, [(records[k], contexts[k]) for k in group])
+    codes = Counter((r.inputs.code, r.origin.casadi) for r in records if r.origin is not None)
+    installed = [code for code in codes if code[0] == hash_installed_code()]
+    usual = max(installed or codes, key=lambda code: codes[code], default=None)
+    seen: dict[object, RunRecord] = {}
+    for k in sorted(range(len(records)), key=lambda k: records[k].run):
+        marks = _list_marks(records[k])
+        contexts[k].first = {kind: seen.setdefault((kind, *mark), records[k]) for kind, mark in marks.items()}
+        contexts[k].code = usual
+    return contexts
 
 
-def check_code(records: Sequence[RunRecord], reasons: Reasons) -> None:
-    """Find runs of other code than the installed one, or, if no record is of that, than most records."""
-    found = Counter((r.origin.code_sha256, r.origin.casadi) for r in records if r.origin is not None)
-    own = [key for key in found if key[0] == hash_installed_code()]
-    usual = max(own or found, key=lambda key: found[key], default=("", ""))
-    for record, why in zip(records, reasons, strict=True):
-        if record.origin is None and "imported" not in record.definition:
-            why.append("it does not say which code computed it")
-        elif record.origin is not None and (record.origin.code_sha256, record.origin.casadi) != usual:
-            why.append(
-                f"it was computed by other code ({record.origin.code}) than the others ({usual[0][:8]}, CasADi {usual[1]})"
-            )
+def _list_marks(record: RunRecord) -> dict[str, tuple[object, ...]]:
+    """Return what only one record may have, or what all runs of a solver share, by kind."""
+    solver = record.problem, record.solver, record.inputs.solver_key
+    marks: dict[str, tuple[object, ...]] = {
+        "label": (record.problem, record.solver),
+        "solver": solver,
+        "seed": (*solver, record.seed),
+    }
+    if record.inputs.imported:
+        return marks
+    if record.time_s.solve > 0.0:
+        marks["times"] = (record.problem, record.time_s.solve, *record.time_s.history)
+    if record.inputs.handling is not None and len(set(record.history.objective)) >= TELLING:
+        marks["history"] = (*solver, *record.history.objective, *record.history.evaluations)
+    return marks
+
+
+def _evaluate_points(problem: GaitProblem, pairs: Sequence[tuple[RunRecord, Context]]) -> None:
+    """Fill in objective, violation and indexes at the points of a problem."""
+    points: list[tuple[RunRecord, Context, Array]] = []
+    for record, context in pairs:
+        try:
+            points += [(record, context, problem.check_x(record.x))] if record.x else []
+        except (GaitError, ValueError) as error:
+            context.objections.append(f"its point does not belong to the problem: {error}")
+    sign = problem.objective.sign
+    if len(points) > MOST_INTERPRETED:
+        costs, violations = compile_objective(problem)(np.array([x for _, _, x in points]))
+        for (_, context, _), cost, violation in zip(points, costs.tolist(), violations.tolist(), strict=True):
+            context.objective, context.violation = sign * cost, math.inf if math.isnan(violation) else violation
+        points = [point for point in points if check_objective(*point[:2]) or check_violation(*point[:2])]
+    model = build_exact_model(problem)
+    for _, context, x in points:  # after compiled ones, those that the interpreted functions decide
+        exact: ExactValues = model.at(x, problem.p)
+        context.objective, context.indexes = sign * exact.cost, exact.indexes
+        context.violation = math.inf if math.isnan(exact.violation) else exact.violation
+
+
+def _choose_runs(
+    pairs: Sequence[tuple[RunRecord, Context]], reasons: Sequence[Sequence[str]], scope: Scope
+) -> Iterator[int]:
+    """Yield the positions of runs whose verdict between the samples is repeated."""
+    records = [record for record, _ in pairs]
+    signs = [record.inputs.objective.sign for record in records]
+    cost = [s * r.verdict.objective if r.verdict.feasible else math.inf for s, r in zip(signs, records, strict=True)]
+    for group in group_by(records, lambda r: (hash_json(r.inputs.problem), r.solver)):
+        chosen = {"none": [], "all": group, "best": [min(group, key=lambda k: cost[k])]}[scope]
+        for k in chosen:
+            if not reasons[k] and records[k].x and (scope == "all" or math.isfinite(cost[k])):
+                yield k
+
+
+def check_problem(record: RunRecord, context: Context) -> str | None:
+    """Check that the problem is the same today, and that the point belongs to it."""
+    if context.objections:
+        return "; ".join(context.objections)
+    if context.problem is not None and record.inputs.objective != context.problem.objective:
+        return f"its objective is {record.inputs.objective}, that of the problem {context.problem.objective}"
+    return None
+
+
+def check_failed(record: RunRecord, context: Context) -> str | None:
+    """Check that a run without a point has no verdict."""
+    verdict = record.verdict
+    judged = verdict.feasible or math.isfinite(verdict.objective) or verdict.indexes or verdict.dense
+    return "it has a verdict, but no point" if not record.x and (judged or verdict.guaranteed) else None
+
+
+def check_objective(record: RunRecord, context: Context) -> str | None:
+    """Compare the objective with that of x."""
+    stated, value = record.verdict.objective, context.objective
+    if value is None or is_same(stated, value):
+        return None
+    return f"its objective is {stated:.9g}, but that of its x is {value:.9g}"
+
+
+def check_violation(record: RunRecord, context: Context) -> str | None:
+    """Compare the violation with that of x."""
+    stated, value = record.verdict.violation, context.violation
+    if context.objective is None or is_same(stated, value, 1.0):
+        return None
+    return f"its violation is {stated:.3g}, but that of its x is {value:.3g}"
+
+
+def check_feasible(record: RunRecord, context: Context) -> str | None:
+    """Compare feasibility with the violation."""
+    verdict = record.verdict
+    if verdict.feasible == (verdict.violation <= FEASIBILITY_TOLERANCE):
+        return None
+    return (
+        f"it is called {'feasible' if verdict.feasible else 'infeasible'} with a violation of {verdict.violation:.3g}"
+    )
+
+
+def check_indexes(record: RunRecord, context: Context) -> str | None:
+    """Compare the indexes with those of x."""
+    stated, values = record.verdict.indexes, context.indexes
+    if not stated or values is None:
+        return None
+    if stated.keys() != values.keys():
+        return "its indexes have other names than those of the problem"
+    wrong = [name for name in values if not is_same(stated[name], values[name], 1.0)]
+    differences = (f"its index {n} is {stated[n]:.9g}, but that of its x is {values[n]:.9g}" for n in wrong)
+    return "; ".join(differences) or None
+
+
+def check_bound(record: RunRecord, context: Context) -> str | None:
+    """Find a feasible objective that no feasible point can have."""
+    verdict, bound, sign = record.verdict, context.bound, record.inputs.objective.sign
+    slack = SAME_VALUE if verdict.violation == 0.0 else SLACK
+    if bound is None or not verdict.feasible or not sign * (bound - verdict.objective) > slack * abs(bound):
+        return None
+    return f"its objective {verdict.objective:.9g} is better than the proven bound {bound:.9g}"
+
+
+def check_history(record: RunRecord, context: Context) -> str | None:
+    """Check that the best so far never worsens, belongs to the counts, and ends at the judged value."""
+    inputs, history, judged = record.inputs, record.history, record.verdict.objective
+    values = [value for value in history.objective if value is not None]
+    if any(not math.isfinite(value) for value in values):
+        return "its history has a value that is not finite"
+    last = history.objective[-1] if history.objective else None
+    tolerance = END_OF_SEARCH if inputs.is_search else END_OF_IMPORT if inputs.imported else END_OF_SOLVER
+    if last is not None and not abs(last - judged) <= tolerance * max(abs(last), abs(judged)):
+        return f"its history ends at {last:.9g}, but the judge finds {judged:.9g}"
+    counted = history.evaluations[-1] if history.evaluations else 0
+    f = record.evaluations.get("f", counted)
+    if not inputs.imported and (counted > f or (inputs.is_search and history.evaluations and counted != f)):
+        return f"its history ends after {counted} evaluations, but it counts {f}"
+    return None
+
+
+def check_history_of_search(record: RunRecord, context: Context) -> str | None:
+    """Check that the best so far of a search never worsens, and has one entry for each generation at most."""
+    history, iterations = record.history, record.iterations
+    values = [value for value in history.objective if value is not None]
+    if not record.inputs.is_search:
+        return None
+    sign = record.inputs.objective.sign
+    if any(sign * (b - a) > 0.0 for a, b in itertools.pairwise(values)):
+        return "the best value of its history worsens"
+    if None in history.objective[len(history.objective) - len(values) :]:
+        return "its history loses a feasible point"
+    if record.claimed != bool(values):
+        return "its claim and its history disagree on whether a feasible point was found"
+    if any(a >= b for a, b in itertools.pairwise((0, *history.evaluations))):
+        return "its history has two entries at the same number of evaluations"
+    if len(history.evaluations) > iterations:
+        return f"its history has {len(history.evaluations)} entries, more than its {iterations} iterations"
+    return None
+
+
+def check_times(record: RunRecord, context: Context) -> str | None:
+    """Check that times ascend within the run."""
+    times = record.time_s
+    if any(a > b for a, b in itertools.pairwise((0.0, *times.history))):
+        return "the times of its history do not ascend from 0"
+    if any(value < 0.0 for value in (times.build, times.compile, times.solve, times.objective)):
+        return "it has a negative time"
+    if times.history and times.history[-1] > times.solve * (1.0 + SAME_VALUE):
+        return "its history is longer than its run"
+    return None
+
+
+def check_claims(record: RunRecord, context: Context) -> str | None:
+    """Compare claims with the judge, which a run derives from the same functions; imported claims are anything."""
+    claim, violation, verdict = record.claimed_objective, record.claimed_violation, record.verdict
+    if record.inputs.imported:
+        return None
+    if claim is not None and not is_same(claim, verdict.objective):
+        return f"it claims {claim:.9g}, but the judge finds {verdict.objective:.9g}"
+    if not record.inputs.is_search or violation is None:
+        return None
+    if not is_same(violation, verdict.violation, 1.0):
+        return f"it claims a violation of {violation:.3g}, but the judge finds {verdict.violation:.3g}"
+    if record.claimed != (violation == 0.0):
+        return "it claims a feasible point with a violation, or none without"
+    return None
+
+
+def check_counts(record: RunRecord, context: Context) -> str | None:
+    """Compare the counts of a run with each other and with its budget."""
+    inputs, budget = record.inputs, record.inputs.stop.get("evaluations")
+    if inputs.imported:
+        return None
+    f = record.evaluations["f"]
+    if max(record.failed_evaluations, record.iterations if inputs.is_search else 0) > f:
+        return f"it counts more failed evaluations or iterations than its {f} evaluations"
+    if not inputs.is_search or budget is None:
+        return None
+    if f > budget:
+        return f"it counts {f} evaluations, more than its budget of {budget}"
+    if (f == budget) != (BUDGET_USED in record.status.split("; ")):
+        return f"it counts {f} of {budget} evaluations, but ended by: {record.status}"
+    return None
+
+
+def check_copy(record: RunRecord, context: Context) -> str | None:
+    """Find a run that counts twice: with the seed, all times or the whole history of an earlier run of the same problem."""
+    first = context.first
+    for kind in ("times", "history"):
+        if (other := first.get(kind, record)) is not record:
+            return f"it is a copy of {other.solver}, run {other.run}, with all its times or its whole history"
+    if (other := first.get("seed", record)) is not record:
+        return f"its seed {record.seed} repeats that of run {other.run}"
+    return None
+
+
+def check_settings(record: RunRecord, context: Context) -> str | None:
+    """Find a run whose settings are not those of the other runs of its name."""
+    other, first = context.first.get("label", record), context.first.get("solver", record)
+    if other.inputs.solver_key != record.inputs.solver_key:
+        return f"its inputs are not those of run {other.run} of the same name; give the solvers different labels"
+    if record.inputs.is_search and record.x and first.x and record.settings != first.settings:
+        return f"its settings are not those of run {first.run}"
+    return None
+
+
+def check_code(record: RunRecord, context: Context) -> str | None:
+    """Find a run of other code than the installed one, or, if no record is of that, than most records."""
+    if record.inputs.imported or context.code is None:
+        return None
+    if record.origin is None or not record.inputs.code:
+        return "it does not say which code computed it"
+    code = record.inputs.code, record.origin.casadi
+    if code == context.code:
+        return None
+    found, usual = (f"{digest[:8]}, CasADi {casadi}" for digest, casadi in (code, context.code))
+    return f"it was computed by other code ({found}) than the others ({usual})"
+
+
+def check_between_samples(record: RunRecord, context: Context) -> str | None:
+    """Judge a point again between the samples, as a run does: on the dense grid, and by proof."""
+    assert context.problem is not None  # for the type checker
+    stated = record.verdict
+    again = Verdict.from_evaluation(evaluate(context.problem, context.problem.check_x(record.x)))
+    if stated.dense_feasible != again.dense_feasible or not _are_same(stated.dense, again.dense):
+        return "its verdict on the dense grid does not follow from its x"
+    words = ["nothing" if v.guaranteed is None else v.guaranteed.word for v in (stated, again)]
+    if words[0] != words[1]:
+        return f"guaranteed between the samples: recorded {words[0]}, found {words[1]}"
+    return None
+
+
+def _are_same(a: Mapping[str, float] | None, b: Mapping[str, float] | None) -> bool:
+    if a is None or b is None:
+        return a is b
+    return a.keys() == b.keys() and all(is_same(a[name], b[name], 1.0) for name in a)
+
+
+CHECKS: tuple[Check, ...] = (
+    check_problem,
+    check_failed,
+    check_objective,
+    check_violation,
+    check_feasible,
+    check_indexes,
+    check_bound,
+    check_history,
+    check_history_of_search,
+    check_times,
+    check_claims,
+    check_counts,
+    check_copy,
+    check_settings,
+    check_code,
+)

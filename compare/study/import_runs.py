@@ -11,8 +11,7 @@ from compare.judge import evaluate
 from compare.study.evidence import CheckedRecords, check_records
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.record_files import RECORDS, read_records
-from compare.study.store import pass_through_json
-from compare.study.task import LABEL, ProblemSpec
+from compare.study.task import LABEL, Inputs, ProblemSpec
 from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
 from nlp_gait.columns import CsvTable, read_table
 from nlp_gait.errors import InputError
@@ -72,12 +71,7 @@ def import_runs(
     if len(set(runs)) < len(runs):
         raise InputError(f"{table.owner}: a run is duplicated")
     known = {} if histories is None else _read_histories(histories, runs)
-    shared = {
-        "problem": identify_problem(problem),
-        "objective": asdict(problem.objective),
-        "solver": label,
-        "settings": {},
-    }
+    identity = identify_problem(problem)
     records = []
     for k, (run, x) in enumerate(zip(runs, points, strict=True)):
         row = {name: math.nan if column is None else column[k] for name, column in given.items()}
@@ -99,8 +93,14 @@ def import_runs(
                 problem=spec.title,
                 solver=label,
                 run=run,
-                seed=seed,
-                definition=pass_through_json({**shared, "seed": seed, "imported": {"sha256": hash_json(content)}}),
+                inputs=Inputs(
+                    problem=identity,
+                    objective=problem.objective,
+                    solver=label,
+                    settings={},
+                    seed=seed,
+                    imported=hash_json(content),
+                ),
                 settings={"kind": "imported", "file": finals.name},
                 status=f"imported from {finals.name}",
                 claimed=claim is not None and not row["violation"] > 0.0,
@@ -153,12 +153,12 @@ def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> Checked
     """Return the checked imported records in a folder whose problems are those of some records."""
     if not (folder / RECORDS).is_dir():
         return CheckedRecords([], [])
-    known = {record.problem: record.definition["problem"] for record in records}
+    known = {record.problem: record.inputs.problem for record in records}
     imported = [
         record
         for record in read_records(folder)
-        if "imported" in record.definition
+        if record.inputs.imported
         and record.problem in known
-        and not describe_difference(record.definition["problem"], known[record.problem])
+        and not describe_difference(record.inputs.problem, known[record.problem])
     ]
     return check_records(imported)

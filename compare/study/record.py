@@ -1,96 +1,32 @@
-"""One finished run: as plain data, as a JSON file, and as a row of a table, with the code and the machine that it comes from."""
+"""One finished run, as plain data, as a JSON file, and as a row of a table: the only place that knows the schema.
+
+A new field of a record needs one line in ``RunRecord``, where the run fills it in (``run_task.py``), and ``SCHEMA`` + 1.
+"""
 
 from __future__ import annotations
 
 import itertools
 import json
 import math
-import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from datetime import UTC, datetime
-from functools import cache
-from importlib.metadata import version
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from compare.judge import Evaluation
-from compare.study.task import LABEL, ProblemSpec, Task
-from nlp_gait.backends.identity import hash_json
-from nlp_gait.backends.kernel.compiler import read_cpu_info
+from compare.study.origin import Origin, format_now
+from compare.study.task import LABEL, Inputs, ProblemSpec, Task
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import LARGEST_FILE, check_plain, convert_errors, read_json, replace_nan
-from nlp_gait.formulation import GaitProblem, Objective, Result
+from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
 from nlp_gait.notebook import format_html_table, import_pandas
 from nlp_gait.proofs.guarantee import Guarantee
-from nlp_gait.user_code import remove_comments
 
-# Packages and modules that decide the result of a run, next to the problem, whose probes are in the definition.
-CODE = ("metaheuristics", "nlp_gait.backends.solvers", "nlp_gait.backends.nlp", "compare.study.run_task")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Origin:
-    """Code and machine of a run."""
-
-    version: str  #: of this package
-    code_sha256: str  #: hash of the installed code that runs solvers
-    casadi: str  #: its version
-    machine: str  #: processor and system
-
-    @classmethod
-    @cache
-    def make(cls) -> Origin:
-        """Return the origin of a run in this process."""
-        return cls(
-            version=version("nlp-gait"),
-            code_sha256=hash_installed_code(),
-            casadi=version("casadi"),
-            machine=f"{describe_processor()}, {describe_system()}",
-        )
-
-    @property
-    def code(self) -> str:
-        """Version and hash, for messages."""
-        return f"{self.version}, code {self.code_sha256[:8]}, CasADi {self.casadi}"
-
-
-def format_now() -> str:
-    """Return the date and time, UTC."""
-    return datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-
-
-@cache
-def describe_processor() -> str:
-    """Return the name of the processor."""
-    return read_cpu_info("model name") or platform.processor() or "unknown"
-
-
-def describe_system() -> str:
-    """Return the operating system and the machine type."""
-    return f"{platform.system()} {platform.release()} {platform.machine()}"
-
-
-@cache
-def hash_installed_code() -> str:
-    """Return the hash of the installed code that runs solvers, without comments and docstrings."""
-    found = {}
-    for name in CODE:
-        package, _, module = name.rpartition(".")
-        path = Path(str(files(package or module))) / (module if package else "")
-        sources = sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]
-        found[name] = [
-            (s.relative_to(path.parent).as_posix(), remove_comments(s.read_bytes()).decode()) for s in sources
-        ]
-    return hash_json(found)
-
-
-SCHEMA = 4
+SCHEMA = 5
 REMEDY = "delete it to have the run repeated"
 CALLS = tuple(field.name for field in fields(Evaluations))
 JUDGED = ("objective", "violation", "feasible", "feasible_between_samples", "guaranteed")
@@ -178,8 +114,7 @@ class RunRecord:
     problem: str  #: label, or name without one
     solver: str  #: label, or name without one
     run: int  #: number within the study
-    seed: int  #: of this run
-    definition: Mapping[str, Any]  #: everything that the result depends on, see ``Task.definition``
+    inputs: Inputs  #: everything that the result depends on
     settings: Mapping[str, Any]  #: of the solver, defaults included
     status: str  #: why the run ended, in words
     claimed: bool  #: whether the solver claims a feasible result
@@ -204,8 +139,7 @@ class RunRecord:
             problem=task.problem.title,
             solver=task.title,
             run=task.run,
-            seed=task.run_seed,
-            definition=task.definition(),
+            inputs=task.inputs(),
             time_s=replace(time_s, finished=format_now()),
             origin=Origin.make(),
             **results,
@@ -232,12 +166,17 @@ class RunRecord:
         )
 
     @property
+    def seed(self) -> int:
+        """Seed of this run."""
+        return self.inputs.seed
+
+    @property
     def objective_text(self) -> str:
         """The judge's objective, for example ``power 0.845869 W``."""
         if not self.verdict.feasible:
             return "infeasible"
-        objective = self.definition["objective"]
-        return f"{objective['name']} {self.verdict.objective:.6g} {objective['unit']}".removesuffix(" 1")
+        objective = self.inputs.objective
+        return f"{objective.name} {self.verdict.objective:.6g} {objective.unit}".removesuffix(" 1")
 
     def __repr__(self) -> str:
         return f"<RunRecord of {self.solver} on {self.problem}, run {self.run}: {self.objective_text}>"
@@ -254,20 +193,6 @@ class RunRecord:
         return {"schema": SCHEMA, **replace_nan(asdict(self))}
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Definition:
-    problem: StoredProblem
-    objective: Objective
-    solver: str | Mapping[str, Any]
-    settings: Mapping[str, Any]
-    seed: int
-    imported: Mapping[str, str] | None = None
-    handling: Mapping[str, Any] | None = None
-    stop: Mapping[str, Any] | None = None
-    polishes: Mapping[str, Any] | None = None
-    start: Mapping[str, float] | None = None
-
-
 def read_record(path: Path) -> RunRecord:
     """Return the record in a file; raises InputError if it is damaged or has another schema."""
     raw = read_json(path, "record", remedy=REMEDY)
@@ -280,18 +205,13 @@ def read_record(path: Path) -> RunRecord:
         return parse_record(raw)
 
 
-def decode_record(raw: Any) -> RunRecord:
-    """Return a record from ``RunRecord.to_json`` without checking its definition; raises ValueError for wrong fields."""
-    record = decode(RunRecord, raw, unread=("schema",))
-    violation = math.inf if math.isnan(record.verdict.violation) else record.verdict.violation
-    return replace(record, verdict=replace(record.verdict, violation=violation))
-
-
 def parse_record(raw: Any) -> RunRecord:
     """Return a record from ``RunRecord.to_json``; raises ValueError for missing, wrong or contradictory fields."""
-    record = decode_record(raw)
-    objective = decode(_Definition, record.definition, "definition").objective
-    for text in (objective.name, objective.unit):
+    record = decode(RunRecord, raw, unread=("schema",))
+    if math.isnan(record.verdict.violation):
+        record = replace(record, verdict=replace(record.verdict, violation=math.inf))
+    decode(StoredProblem, record.inputs.problem, "inputs.problem")
+    for text in (record.inputs.objective.name, record.inputs.objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
             raise ValueError(f"{text!r} is not a name or unit of an objective")
     for title in (record.problem, record.solver):
@@ -303,11 +223,9 @@ def parse_record(raw: Any) -> RunRecord:
     counts = (record.run, record.seed, record.failed_evaluations, record.iterations, *record.evaluations.values())
     if min(counts) < 0 or any(a > b for a, b in itertools.pairwise((0, *history.evaluations))):
         raise ValueError("counts must be at least 0, and those of the history ascend")
-    unknown = "imported" in record.definition and not record.evaluations and not history.evaluations
+    unknown = record.inputs.imported and not record.evaluations and not history.evaluations
     if not unknown and ("f" not in record.evaluations or not set(CALLS).issuperset(record.evaluations)):
         raise ValueError(f"evaluations must be counts of {', '.join(sorted(CALLS))}, among them f")
-    if record.definition["seed"] != record.seed:
-        raise ValueError(f"seed is {record.seed}, but {record.definition['seed']} in the definition")
     if verdict.feasible and not math.isfinite(verdict.objective):
         raise ValueError("a feasible verdict without an objective")
     return record
@@ -328,9 +246,15 @@ def load_gait(record: RunRecord) -> Result:
     return Result(problem=problem, x=problem.check_x(record.x))
 
 
+def load_result_or_record(path: Path) -> Result:
+    """Return the problem and the point in a result file or a record; raises InputError as ``load_result``."""
+    raw = read_json(path, "result")
+    return load_gait(read_record(path)) if isinstance(raw, dict) and "inputs" in raw else load_result(path)
+
+
 def load_problem(record: RunRecord) -> GaitProblem:
     """Return the problem of a record; raises GaitError if it cannot be loaded."""
-    stored = decode(StoredProblem, record.definition["problem"], "definition.problem")
+    stored = decode(StoredProblem, record.inputs.problem, "inputs.problem")
     owner = f"the record of {record.solver}, run {record.run},"
     name, options = resolve_stored(stored.name, stored.options, owner)
     return ProblemSpec(name=name, options=options, values=stored.parameters).load()
@@ -340,8 +264,7 @@ def make_row(record: RunRecord) -> list[object]:
     """Return a run under ``HEADER``; None for unknown values."""
     calls = [record.evaluations.get(kind) for kind in CALLS]
     claims = (record.claimed, record.status, record.claimed_objective, record.claimed_violation)
-    imported = "imported" in record.definition
-    counts = (None, None) if imported else (record.failed_evaluations, record.iterations)
+    counts = (None, None) if record.inputs.imported else (record.failed_evaluations, record.iterations)
     return [
         *(record.problem, record.solver, record.run, record.seed, *claims),
         *make_judged_cells(record),

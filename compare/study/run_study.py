@@ -8,12 +8,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from compare.study.cluster import Job, run_on_cluster
-from compare.study.definition import describe_differences
+from compare.study.cluster import run_on_cluster
 from compare.study.evidence import check_records
-from compare.study.record import RunRecord, check_readable, hash_installed_code, make_frame
-from compare.study.record_files import find_record, locate_record, write_record
-from compare.study.run_task import PLANNED_RUNS, Run, run_task, try_task
+from compare.study.origin import hash_installed_code
+from compare.study.record import RunRecord, check_readable, make_frame
+from compare.study.record_files import find_record, locate_record, name_run, write_record
+from compare.study.run_task import PLANNED_RUNS, try_task
+from compare.study.settings import list_runs
 from compare.study.task import Task, check_task
 from nlp_gait.errors import GaitError, InputError, NoWorkersError, OutputError, WorkerError
 from nlp_gait.files import convert_errors, make_writable_folder, remove_leftovers
@@ -26,10 +27,8 @@ from nlp_gait.progress import Progress
 DEATHS_WITHOUT_PROGRESS = 3
 
 
-def run_jobs(
-    jobs: Sequence[Job], workers: int = 1, scheduler: str | None = None, run: Run = run_task
-) -> Iterator[tuple[int, RunRecord]]:
-    """Run jobs in their order, and yield the position and the record of each as it finishes.
+def run_tasks(tasks: Sequence[Task], workers: int = 1, scheduler: str | None = None) -> Iterator[tuple[int, RunRecord]]:
+    """Run tasks in their order, and yield the position and the record of each as it finishes.
 
     One worker is this process; the address of a Dask scheduler stands for its workers instead.
 
@@ -37,24 +36,22 @@ def run_jobs(
         WorkerError: worker processes keep dying, or the cluster is lost.
         InputError: no Dask scheduler answers at the address, or Dask is not installed.
     """
-    alone = scheduler is None and (workers == 1 or len(jobs) <= 1)
-    # A GaitProblem has symbols and functions, which cannot leave this process.
-    here = {position for position, (task, _) in enumerate(jobs) if alone or not isinstance(task.problem.name, str)}
-    for position in sorted(here):
-        with remember_interrupts() as check:
-            record = try_task(*jobs[position], run)
-            check()
-        yield position, record
-    if len(here) == len(jobs):
-        return
-    waiting = {position: job for position, job in enumerate(jobs) if position not in here}
-    if scheduler is not None:
-        yield from run_on_cluster(waiting, scheduler, run)
+    is_alone = scheduler is None and (workers == 1 or len(tasks) <= 1)
+    waiting = dict(enumerate(tasks))
+    for position, task in enumerate(tasks):
+        # A GaitProblem has symbols and functions, which cannot leave this process.
+        if is_alone or not isinstance(task.problem.name, str):
+            with remember_interrupts() as check:
+                record = try_task(waiting.pop(position))
+                check()
+            yield position, record
+    if waiting and scheduler is not None:
+        yield from run_on_cluster(waiting, scheduler)
         return
     deaths = 0
     while waiting:
         try:
-            calls = {position: partial(try_task, *job, run) for position, job in waiting.items()}
+            calls = {position: partial(try_task, task) for position, task in waiting.items()}
             for position, record in run_in_processes(calls, min(workers, len(calls))):
                 del waiting[position]
                 deaths = 0
@@ -74,11 +71,10 @@ def run_jobs(
 class Study:
     """What to run."""
 
-    tasks: tuple[Task, ...]  #: all runs, in any order; a run may polish the result of another
+    tasks: tuple[Task, ...]  #: all runs, in any order
     folder: Path | None = None  #: where records are written (see ``compare.study.record_files``); None writes none
     jobs: int = 1  #: worker processes; 1 runs in this process
     scheduler: str | None = None  #: address of a Dask scheduler to use instead of local processes
-    run: Run = run_task  #: function that performs one run; it may store more than the record
 
     def __post_init__(self) -> None:
         """Validate the study."""
@@ -86,11 +82,11 @@ class Study:
             raise InputError(f"jobs must be at least 1, got {self.jobs}")
         if not self.tasks:
             raise InputError("a study needs at least one problem, one solver and one run")
-        files = Counter(locate_record(Path(), task) for task in self.tasks)
-        duplicate = next((file for file, count in files.items() if count > 1), None)
-        if duplicate is not None:
+        names = Counter((task.problem.title, task.title, task.run) for task in self.tasks)
+        (problem, solver, _), count = names.most_common(1)[0]
+        if count > 1:
             raise InputError(
-                f"two solvers of the study are called {duplicate.stem!r} on {duplicate.parent.name!r}; give them different labels"
+                f"two solvers of the study are called {solver!r} on {problem!r}; give them different labels"
             )
 
     @property
@@ -124,28 +120,23 @@ def run_study(
 ) -> list[RunRecord]:
     """Run all tasks without a record and return the records of all tasks, in task order.
 
-    Each record is written as soon as its run has ended, so an interruption loses only the runs in progress. A record belongs to
-    a task if their definitions are equal. Other records stay in the folder under their own key. All runs of a study are of one
-    code: if one is to be computed, those of another code than the installed one are recomputed, too.
+    A record belongs to a task if their inputs are equal. Each record is written as soon as its run has ended, so an interruption
+    loses only the runs in progress. The study in the folder then consists of these runs, and of those of other solvers.
 
     Args:
         study: what to run.
         progress: called after each run.
         on_stored: called once with the number of runs that have a record.
-        on_outdated: called with a message for each solver whose records are outdated and will be recomputed.
+        on_outdated: called with a message for each solver whose records are no evidence and will be recomputed.
 
     Raises:
         UnknownNameError, InputError: see ``check_task``; InputError also for a damaged record.
         OutputError: the folder is not writable (checked before the first run).
+        WorkerError: see ``run_tasks``; also if a worker runs other code than this process.
         Interrupted: Ctrl-C; contains the records of the finished runs.
     """
     check_study(study)
     records, outdated = _load_records(study)
-    if len(records) < len(study.tasks):
-        for index, record in list(records.items()):
-            if record.origin is not None and record.origin.code_sha256 != hash_installed_code():
-                del records[index]
-                outdated[record.problem, record.solver, f"it was computed by other code ({record.origin.code})"] += 1
     if on_outdated is not None:
         for (problem, solver, reason), count in outdated.items():
             on_outdated(f"{solver} on {problem}: {count} run{'s' * (count > 1)} recomputed: {reason}")
@@ -153,6 +144,8 @@ def run_study(
         on_stored(len(records))
     try:
         for index, record in _run_missing(study, records):
+            if record.inputs.code != hash_installed_code():
+                raise WorkerError("a worker has another version of nlp-gait than this machine; install the same")
             with delay_interrupts():
                 if study.folder is not None:
                     _write(record, study.folder, len(records))
@@ -177,48 +170,38 @@ def check_study(study: Study) -> None:
 
 
 def _load_records(study: Study) -> tuple[dict[int, RunRecord], Counter[tuple[str, str, str]]]:
-    """Return the records by index of the task, and the outdated ones by problem, solver and what has changed."""
-    records: dict[int, RunRecord] = {}
-    outdated: Counter[tuple[str, str, str]] = Counter()
+    """Return the records by index of the task, and the rejected ones by problem, solver and reason; list the runs."""
     if study.folder is None:
-        return records, outdated
+        return {}, Counter()
     for folder in {locate_record(study.folder, task).parent for task in study.tasks}:
         remove_leftovers(make_writable_folder(folder))
-    for index, task in enumerate(study.tasks):
-        record, other = find_record(study.folder, task)
-        if record is not None:
-            records[index] = record
-        elif other is not None:
-            outdated[task.problem.title, task.title, describe_differences(other.definition, task.definition())] += 1
-    problems = {id(record): study.tasks[index].problem for index, record in records.items()}
+    list_runs(study.folder, [name_run(task) for task in study.tasks])
+    records = {index: find_record(study.folder, task) for index, task in enumerate(study.tasks)}
+    known = {index: record for index, record in records.items() if record is not None}
+    problems = {id(record): study.tasks[index].problem for index, record in known.items()}
     evidence = check_records(
-        list(records.values()), find_problem=lambda record: problems[id(record)].load(), between_samples="none"
+        list(known.values()), find_problem=lambda record: problems[id(record)].load(), between_samples="none"
     )
-    for exclusion in evidence.excluded:
-        assert exclusion.record is not None  # for the type checker
-        outdated[exclusion.record.problem, exclusion.record.solver, exclusion.reasons[0]] += 1
+    rejected = Counter((e.record.problem, e.record.solver, e.reasons[0]) for e in evidence.excluded if e.record)
     kept = {id(record) for record in evidence.records}
-    return {index: record for index, record in records.items() if id(record) in kept}, outdated
+    return {index: record for index, record in known.items() if id(record) in kept}, rejected
 
 
 def _run_missing(study: Study, records: dict[int, RunRecord]) -> Iterator[tuple[int, RunRecord]]:
     """Run the tasks without a record; yield their indices and records as they finish."""
-    if study.scheduler is None and study.run is run_task:
-        _prepare_solvers([task for index, task in enumerate(study.tasks) if index not in records])
-    by_title = {(task.problem.title, task.title, task.run): index for index, task in enumerate(study.tasks)}
-    for polishing in (False, True):
-        waiting = [i for i, t in enumerate(study.tasks) if i not in records and bool(t.polishes) == polishing]
-        # Long runs first, to balance the load; and runs of all problems in turn.
-        waiting.sort(key=lambda i: (study.tasks[i].is_search, study.tasks[i].run))
-        tasks = [study.tasks[i] for i in waiting]
-        starts = [records[by_title[t.problem.title, t.polishes, t.run]] if polishing else None for t in tasks]
-        for position, record in run_jobs(list(zip(tasks, starts, strict=True)), study.jobs, study.scheduler, study.run):
-            yield waiting[position], record
+    waiting = [index for index in range(len(study.tasks)) if index not in records]
+    if study.scheduler is None:
+        _prepare_solvers([study.tasks[index] for index in waiting])
+    # Long runs first, to balance the load; and runs of all problems in turn.
+    waiting.sort(key=lambda index: (study.tasks[index].is_search, study.tasks[index].run))
+    tasks = [study.tasks[index] for index in waiting]
+    for position, record in run_tasks(tasks, study.jobs, study.scheduler):
+        yield waiting[position], record
 
 
 def _prepare_solvers(tasks: Sequence[Task]) -> None:
     """Compile once what pays for many runs; the runs find it in the cache folder, in whatever process they are."""
-    named = [t for t in tasks if not t.is_search and not t.is_user_code and isinstance(t.problem.name, str)]
+    named = [t for t in tasks if (t.polish or not t.is_search) and isinstance(t.problem.name, str)]
     for task in {(t.problem.title, t.title): t for t in reversed(named)}.values():
         with suppress(GaitError):  # the records of the runs report it
             task.make_solver().prepare(task.problem.load(), PLANNED_RUNS)

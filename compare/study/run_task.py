@@ -5,6 +5,8 @@ import math
 import multiprocessing
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -20,8 +22,8 @@ from nlp_gait.files import LARGEST_FILE, check_plain
 from nlp_gait.formulation.solution import Best
 from nlp_gait.processes import keep_working_folder, run_in_isolation
 
-Run = Callable[[Task, RunRecord | None], RunRecord]
-"""Performs one run of a task, from the run that it polishes if it does; it is sent to worker processes."""
+Run = Callable[[Task], RunRecord]
+"""Performs one run of a task."""
 
 MOST_REASON = 500  # characters of an error in a record
 MOST_HISTORY = 10_000  # entries of a history in a record, some 60 bytes each
@@ -32,25 +34,31 @@ GRACE_S = 5.0
 PLANNED_RUNS = 20
 
 
-def run_task(task: Task, start: RunRecord | None = None, callback: Callable[..., None] | None = None) -> RunRecord:
-    """Perform one run and judge its result; raises InputError if the run to polish has no point.
+def run_task(task: Task, callback: Callable[..., None] | None = None) -> RunRecord:
+    """Perform one run and judge its result; raises InputError if a search to polish has no point.
 
-    ``start`` is the run that this one polishes; its cost is included. ``callback`` receives X, f, violation of every generation.
+    ``callback`` receives X, f, violation of every generation of a search.
     """
-    return _search(task, callback) if task.is_search else _solve(task, start)
+    if not task.is_search:
+        return _solve(task)
+    search = _search(task, callback)
+    return _solve(task, search) if task.polish else search
 
 
-def try_task(task: Task, start: RunRecord | None = None, run: Run = run_task) -> RunRecord:
+def try_task(task: Task, run: Run = run_task) -> RunRecord:
     """Perform one run; whatever fails in it becomes its record instead of ending the study.
 
-    User code runs in its own process, which is killed if it does not return.
+    User code runs in its own process, which is killed if it does not return; IPOPT polishes its result in this one.
     """
-    return _run_isolated(task, start, run) if task.is_user_code else _run_caught(task, start, run)
+    if not task.is_user_code:
+        return _run_caught(task, run)
+    search = _run_isolated(replace(task, polish=False), run)
+    return _run_caught(task, partial(_solve, search=search)) if task.polish else search
 
 
-def _run_caught(task: Task, start: RunRecord | None, run: Run) -> RunRecord:
+def _run_caught(task: Task, run: Run) -> RunRecord:
     try:
-        record = run(task, start)
+        record = run(task)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # user code may raise anything
@@ -72,19 +80,19 @@ def _describe(error: BaseException) -> str:
     return (f"{name}: {text}" if text else name).encode("utf-8", "backslashreplace").decode()
 
 
-def _run_isolated(task: Task, start: RunRecord | None, run: Run) -> RunRecord:
+def _run_isolated(task: Task, run: Run) -> RunRecord:
     """Run in a forked process, in this one where it may not fork (Windows, Dask's workers).
 
     Everything but the run is built before the fork, so that the time limit is for the run alone. What it prints is dropped.
     """
     if "fork" not in multiprocessing.get_all_start_methods() or multiprocessing.current_process().daemon:
-        return _run_caught(task, start, run)
+        return _run_caught(task, run)
     problem = task.problem.load()
     compile_objective(problem, threads=1)
     evaluate(problem, 0.5 * (problem.lower + problem.upper))
 
     def call() -> bytes:
-        return json.dumps(_run_caught(task, start, run).to_json(), allow_nan=False).encode()
+        return json.dumps(_run_caught(task, run).to_json(), allow_nan=False).encode()
 
     limit = task.stop.time_limit_s
     try:
@@ -99,7 +107,10 @@ def _run_isolated(task: Task, start: RunRecord | None, run: Run) -> RunRecord:
         return RunRecord.make_failed(task, str(error))
     except (ValueError, RecursionError) as error:
         return RunRecord.make_failed(task, f"its process sent no record: {error}")
-    if (record.problem, record.solver, record.run) != (task.problem.title, task.title, task.run):
+    if (record.problem, record.solver, record.run, record.inputs.key) != (
+        *(task.problem.title, task.title, task.run),
+        task.inputs().key,
+    ):
         return RunRecord.make_failed(task, "its process sent the record of another run")
     return record
 
@@ -163,17 +174,14 @@ def _choose_entries(best: Sequence[float | None]) -> list[int]:
     return sorted({*changes[:: math.ceil(len(changes) / MOST_HISTORY)], len(best) - 1})
 
 
-def _solve(task: Task, start: RunRecord | None) -> RunRecord:
+def _solve(task: Task, search: RunRecord | None = None) -> RunRecord:
+    """Run an NLP solver: from the given start, from the end of a search that it polishes, or from a random point."""
     started = time.perf_counter()
     problem, solver = task.problem.load(), task.make_solver()
-    if task.start:
-        x0 = problem.check_within(task.start)
-    elif start is None:
-        x0 = problem.start_point(np.random.default_rng(task.run_seed))
-    elif not start.x:
-        raise InputError(f"{start.solver}, run {start.run}, has no point to polish: {start.status}")
-    else:
-        x0 = problem.check_within(start.x)
+    if search is not None and not search.x:
+        raise InputError(f"the search has no point to polish: {search.status}")
+    start = task.start if search is None else search.x
+    x0 = problem.check_within(start) if start else problem.start_point(np.random.default_rng(task.run_seed))
     outcome = solver.prepare(problem, PLANNED_RUNS).run(problem, x0)
     prepared_s = time.perf_counter() - started - outcome.time_s
     compile_s = min(outcome.compile_s, prepared_s)  # less where the process had the solver already
@@ -181,29 +189,28 @@ def _solve(task: Task, start: RunRecord | None) -> RunRecord:
     if outcome.linear_solver:
         settings["linear_solver"] = outcome.linear_solver
     solution = make_solution(problem, [outcome])
-    evaluations, earlier = outcome.evaluations.by_kind(), list[Best]()
-    before, before_s = (0, 0.0) if start is None else (start.evaluations["f"], start.time_s.solve)
-    if start is not None:
-        evaluations["f"] += before
-        earlier = list(map(Best, start.history.evaluations, start.history.objective, start.time_s.history))
+    evaluations, history, calls, seconds = outcome.evaluations.by_kind(), list[Best](), 0, 0.0
+    if search is not None:
+        calls, seconds = search.evaluations["f"], search.time_s.solve
+        evaluations["f"] += calls
+        history += map(Best, search.history.evaluations, search.history.objective, search.time_s.history)
+        settings = {**search.settings, IPOPT: settings}
     # A solver that keeps no history has its end.
-    own = outcome.history or (
-        Best(outcome.evaluations.f, outcome.objective if outcome.claimed else None, outcome.time_s),
-    )
-    history = [*earlier, *(Best(before + best.calls, best.objective, before_s + best.time_s) for best in own)]
+    end = Best(outcome.evaluations.f, outcome.objective if outcome.claimed else None, outcome.time_s)
+    history += (Best(calls + b.calls, b.objective, seconds + b.time_s) for b in outcome.history or (end,))
     history = [history[k] for k in _choose_entries([best.objective for best in history])]
     verdict = Verdict.from_evaluation(evaluate(problem, outcome.x))
     return RunRecord.from_task(
         task,
         settings=settings,
-        status=solution.status if task.solver == IPOPT else outcome.status,  # other solvers are quoted
+        status=solution.status if solver.name == IPOPT else outcome.status,  # other solvers are quoted
         claimed=outcome.claimed,
         x=problem.by_name(outcome.x),
         claimed_objective=verdict.objective if math.isfinite(verdict.objective) else None,
         claimed_violation=outcome.violation if math.isfinite(outcome.violation) else None,
         verdict=verdict,
         evaluations=evaluations,
-        failed_evaluations=0,
+        failed_evaluations=0 if search is None else search.failed_evaluations,
         iterations=outcome.iterations,
         active_constraints=solution.active_constraints,
         history=History(
@@ -212,7 +219,7 @@ def _solve(task: Task, start: RunRecord | None) -> RunRecord:
         time_s=Times(
             build=prepared_s - compile_s,
             compile=compile_s,
-            solve=before_s + outcome.time_s,
+            solve=seconds + outcome.time_s,
             objective=outcome.objective_s,
             history=tuple(best.time_s for best in history),
         ),

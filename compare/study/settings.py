@@ -10,13 +10,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
-from compare.study.record import describe_processor, describe_system, format_now, hash_installed_code
+from compare.study.origin import describe_processor, describe_system, format_now, hash_installed_code
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task, list_solvers
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes
 from nlp_gait.decoding import decode
 from nlp_gait.errors import CompilerError, InputError
-from nlp_gait.files import check_plain, convert_errors, read_json, read_text, write_json
+from nlp_gait.files import check_plain, convert_errors, lock_folder, read_json, read_text, write_json
 from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import resolve_code
@@ -34,7 +34,7 @@ class SolverSpec:
     label: str = ""  #: its name in the study; empty for ``name``
     runs: int | None = None  #: number; None for the study's
     settings: Mapping[str, Any] = field(default_factory=dict)  #: that differ from its defaults
-    polish: bool = False  #: whether IPOPT starts from each of its results, as another solver ``<label>+ipopt``
+    polish: bool = False  #: whether each run is also made with IPOPT at its end, as another solver ``<label>+ipopt``
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +59,7 @@ class StudySettings:
             raise InputError(f"seed must be a whole number of at least 0, got {self.seed}")
 
     def tasks(self) -> tuple[Task, ...]:
-        """Return every run of the study: for each problem and solver its runs, then those that polish them."""
+        """Return every run of the study: for each problem and solver its runs, then those that IPOPT polishes."""
         tasks: list[Task] = []
         for problem in self.problems:
             for solver in self.solvers:
@@ -75,10 +75,8 @@ class StudySettings:
                 runs = range(solver.runs or (self.starts if solver.name in GRADIENT_SOLVERS else self.runs))
                 tasks += [replace(task, run=run) for run in runs]
                 if solver.polish:
-                    polish = replace(
-                        task, solver=IPOPT, settings={}, label=f"{task.title}+{IPOPT}", polishes=task.title
-                    )
-                    tasks += [replace(polish, run=run, polished=replace(task, run=run)) for run in runs]
+                    polished = replace(task, label=f"{task.title}+{IPOPT}", polish=True)
+                    tasks += [replace(polished, run=run) for run in runs]
         return tuple(tasks)
 
     def to_json(self) -> dict[str, Any]:
@@ -222,37 +220,63 @@ class Session:
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """Settings of the study that was run last, None without a manifest, and the sessions in its folder."""
+    """Content of ``study.json``."""
 
-    settings: StudySettings | None
+    settings: StudySettings | None  #: of the study that a command ran last; None without one
     sessions: tuple[Session, ...]
+    runs: tuple[str, ...]  #: that belong to the study: names of their records without suffix
 
 
 @dataclass(frozen=True, kw_only=True)
 class _File:
-    schema: Literal[1]
-    study: Mapping[str, Any]
-    sessions: tuple[Session, ...]
+    schema: Literal[2] = 2
+    study: Mapping[str, Any] | None = None
+    sessions: tuple[Session, ...] = ()
+    runs: tuple[str, ...] = ()
 
 
 def write_manifest(folder: Path, settings: StudySettings, session: Session) -> None:
     """Add a session to the manifest of a folder, with the latest settings; raises InputError if the manifest is damaged."""
-    sessions: Sequence[Session] = read_manifest(folder).sessions
-    data = {"schema": 1, "study": settings.to_json(), "sessions": [asdict(s) for s in (*sessions, session)]}
-    write_json(folder / FILE, data)
+    with lock_folder(folder):
+        file = _read_file(folder)
+        _write_file(folder, replace(file, study=settings.to_json(), sessions=(*file.sessions, session)))
+
+
+def list_runs(folder: Path, names: Sequence[str]) -> None:
+    """Make runs part of the study; they replace the runs of their problems and solvers, whose records stay as files.
+
+    Raises InputError if the manifest is damaged, and OutputError.
+    """
+    with lock_folder(folder):
+        file = _read_file(folder)
+        solvers = {_name_solver(name) for name in names}
+        others = [name for name in file.runs if _name_solver(name) not in solvers]
+        if set(file.runs) != {*others, *names}:
+            _write_file(folder, replace(file, runs=(*others, *dict.fromkeys(names))))
+
+
+def _name_solver(name: str) -> str:
+    return name.rsplit("-", 2)[0]  # without run and key
+
+
+def _write_file(folder: Path, file: _File) -> None:
+    write_json(folder / FILE, asdict(file))
+
+
+def _read_file(folder: Path) -> _File:
+    path = folder / FILE
+    if not os.path.lexists(path):
+        return _File()
+    raw = read_json(path, "manifest", remedy=REMEDY)
+    with convert_errors(f"manifest {str(path)!r} is damaged", InputError, REMEDY):
+        return decode(_File, raw)
 
 
 def read_manifest(folder: Path) -> Manifest:
     """Return the manifest of a folder, empty where none is stored; raises InputError if it is damaged or of another schema."""
-    path = folder / FILE
-    if not os.path.lexists(path):
-        return Manifest(settings=None, sessions=())
-    raw = read_json(path, "manifest", remedy=REMEDY)
-    with convert_errors(f"manifest {str(path)!r} is damaged", InputError, REMEDY):
-        file = decode(_File, raw)
-    return Manifest(
-        settings=parse_settings(file.study, f"manifest {str(path)!r}", runs_code=False), sessions=file.sessions
-    )
+    file, source = _read_file(folder), f"manifest {str(folder / FILE)!r}"
+    settings = None if file.study is None else parse_settings(file.study, source, runs_code=False)
+    return Manifest(settings=settings, sessions=file.sessions, runs=file.runs)
 
 
 def _list_versions() -> dict[str, str]:

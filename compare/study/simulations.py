@@ -120,7 +120,7 @@ def _name(record: RunRecord) -> str:
 
 
 def _list_inputs(record: RunRecord, drive: Drive) -> dict[str, Any]:
-    return {"problem": record.definition["problem"], "x": dict(record.x), "drive": asdict(drive)}
+    return {"problem": record.inputs.problem, "x": dict(record.x), "drive": asdict(drive)}
 
 
 def _hash_plan(plan: Plan, drive: Drive) -> str:

@@ -1,31 +1,33 @@
-"""What to run, as plain data for files and other processes."""
+"""What to run, as plain data for files and other processes, and the inputs of a run, from which its file is named."""
 
 import inspect
 import json
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, is_dataclass, replace
-from functools import lru_cache
+from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from compare.study.definition import SOURCE, hash_solver_source, select_shared
+from compare.study.origin import hash_installed_code
 from metaheuristics.external_program import ExternalProgram
 from metaheuristics.interface import Algorithm
 from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, make_algorithm, make_handling
 from metaheuristics.user_algorithm import PlainFunction, to_algorithm
-from nlp_gait.backends.identity import hash_json, identify_problem
+from nlp_gait.backends.identity import hash_json, identify_problem, make_key
 from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solver
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation import GaitProblem, Objective
 from nlp_gait.formulation.registry import check_options, find_maker, hash_files, load, resolve_name
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import (
     check_reference,
     find_entry_points,
+    hash_file,
     hash_source,
     is_program,
     is_user_code,
@@ -39,6 +41,8 @@ GRADIENT_SOLVERS = tuple(SOLVERS)
 LABEL = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9._+:() -]{0,62}[A-Za-z0-9._+:()-])?")
 PYMOO = "pymoo:"  # prefix of names that are not user code
 FUNCTION = "function"  # kind of a plain function in settings
+SOURCE = "source_sha256"  # of user code, see ``hash_file``
+KEY_DIGITS = 8
 # Replaces a user-defined solver in checks before its code runs.
 UNREAD: Any = PlainFunction(function=lambda f, lower, upper, evaluations, seed: None, name="own")
 
@@ -121,6 +125,53 @@ class Stop:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Inputs:
+    """Everything that the result of a run depends on."""
+
+    problem: Mapping[str, Any]  #: how to load it, and its probes, see ``identify_problem``
+    objective: Objective
+    #: Name; of user code its name and hash; of an object its settings, and the hash of its file if there is one
+    solver: str | Mapping[str, Any]
+    settings: Mapping[str, Any]  #: of the solver, that differ from its defaults
+    seed: int  #: of this run
+    code: str = ""  #: hash of the installed code that runs solvers; empty for imported results
+    handling: Handling | None = None  #: of a search
+    stop: Mapping[str, Any] = field(default_factory=dict)  #: criteria that the solver heeds, as in ``Stop``
+    polish: bool = False  #: whether IPOPT continues from the end of the search
+    start: Mapping[str, float] = field(default_factory=dict)  #: of an NLP solver; empty for a random point
+    imported: str = ""  #: hash of imported values; empty for a run of ours
+
+    @property
+    def is_search(self) -> bool:
+        """Whether the run ends with a search, so that its claims and history are exact."""
+        return self.handling is not None and not self.polish
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of all inputs for the name of a file: without paths, and of the problem's probes six digits."""
+        return hash_json(self._list())[:KEY_DIGITS]
+
+    @cached_property
+    def solver_key(self) -> str:
+        """Hash of what all runs of a solver on a problem share."""
+        return hash_json({**self._list(), "seed": 0, "start": {}, "imported": bool(self.imported)})
+
+    def _list(self) -> dict[str, Any]:
+        solver = self.solver
+        if isinstance(solver, Mapping) and "name" in solver:
+            solver = {**solver, "name": shorten_name(solver["name"])}
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        handling = None if self.handling is None else asdict(self.handling)
+        return {
+            **values,
+            "problem": make_key(self.problem),
+            "objective": asdict(self.objective),
+            "solver": solver,
+            "handling": handling,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
 class Task:
     """One run."""
 
@@ -134,8 +185,7 @@ class Task:
     seed: int = 0  #: of the study
     run: int = 0  #: number of the run; its seed is ``seed + run``, so that equal runs of all solvers start alike
     label: str = ""  #: of the solver in the study; empty for its name
-    polishes: str = ""  #: label of the search whose run of this number gives the start point; empty for a random start
-    polished: "Task | None" = None  #: that run, if it is known
+    polish: bool = False  #: whether IPOPT continues from the end of a search
     #: Values of all variables by name at which an NLP solver starts; empty for a random point
     start: Mapping[str, float] = field(default_factory=dict)
 
@@ -165,34 +215,30 @@ class Task:
         """True for metaheuristics, False for gradient methods."""
         return self.solver not in GRADIENT_SOLVERS
 
-    def definition(self) -> dict[str, Any]:
-        """Return everything that the result depends on, as plain data; equal definitions have equal results."""
-        problem = self.problem.load()
-        parts: dict[str, Any] = {
-            "problem": identify_problem(problem),
-            "objective": asdict(problem.objective),
-            "solver": self._solver_part(),
-            "settings": dict(self.settings),
-            "seed": self.run_seed,
-        }
-        if self.is_search:
-            parts |= {"handling": asdict(self.handling), "stop": asdict(self.stop)}
-        elif "evaluations" in list_settings(str(self.solver)):
-            parts["stop"] = asdict(self.stop)
-        elif self.stop.time_limit_s is not None:
-            parts["stop"] = {"time_limit_s": self.stop.time_limit_s}
-        if self.start:
-            parts["start"] = dict(self.start)
-        if self.polishes:
-            parts["polishes"] = {"solver": self.polishes, "handling": asdict(self.handling), "stop": asdict(self.stop)}
-            if self.polished is not None:
-                parts["polishes"]["key"] = hash_json(select_shared(self.polished.definition()))
+    def inputs(self) -> Inputs:
+        """Return everything that the result depends on, as plain data; raises InputError for settings that are not plain."""
+        problem, known = self.problem.load(), () if self.is_search else list_settings(str(self.solver))
+        limits = {key: value for key, value in asdict(self.stop).items() if value is not None}
+        if not self.is_search and "evaluations" not in known:  # it ends by itself, or by the clock
+            limits = {key: value for key, value in limits.items() if key == "time_limit_s"}
         try:
-            return json.loads(json.dumps(parts, allow_nan=False))
+            solver, settings = json.loads(json.dumps([self._describe_solver(), dict(self.settings)], allow_nan=False))
         except (TypeError, ValueError) as error:
             raise InputError(f"settings of {self.title!r} must be numbers, texts and lists: {error}") from error
+        return Inputs(
+            problem=identify_problem(problem),
+            objective=problem.objective,
+            solver=solver,
+            settings=settings,
+            seed=self.run_seed,
+            code=hash_installed_code(),
+            handling=self.handling if self.is_search else None,
+            stop=limits,
+            polish=self.polish,
+            start=dict(self.start),
+        )
 
-    def _solver_part(self) -> str | dict[str, Any]:
+    def _describe_solver(self) -> str | dict[str, Any]:
         if not isinstance(self.solver, str):
             source = hash_solver_source(self.solver)
             return {**describe_settings(self.solver), **({} if source is None else {SOURCE: source})}
@@ -212,11 +258,11 @@ class Task:
 
     def make_solver(self) -> Solver:
         """Return the NLP solver with settings and the limits that it respects; InputError for what it does not allow."""
-        name = str(self.solver)
+        name, settings = (IPOPT, {}) if self.polish else (str(self.solver), self.settings)
         known = list_settings(name)
         limits = {"evaluations": self.stop.evaluations, "time_limit_s": self.stop.time_limit_s}
         respected = {limit: value for limit, value in limits.items() if limit in known and value is not None}
-        return make_solver(name, **{**respected, **self.settings})
+        return make_solver(name, **{**respected, **settings})
 
 
 def check_task(task: Task) -> None:
@@ -233,9 +279,9 @@ def check_task(task: Task) -> None:
         raise unknown("algorithm", task.solver, [*list_solvers(), *find_entry_points("algorithm")])
     if task.stop.time_limit_s is not None and not task.stop.time_limit_s > 0.0:
         raise InputError(f"time_limit_s must be > 0, got {task.stop.time_limit_s}")
-    if not task.is_search:
+    if task.polish or not task.is_search:
         task.make_solver().check(problem)
-    else:
+    if task.is_search:
         make_handling(task.handling.name, **task.handling.settings)
         search = UNREAD if task.is_user_code else task.make_search()
         check_limits(search, task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s)
@@ -243,6 +289,18 @@ def check_task(task: Task) -> None:
         if task.is_search:
             raise InputError(f"search {task.title!r} takes no start point; only NLP solvers do")
         problem.check_within(task.start)
+
+
+def hash_solver_source(solver: object) -> str | None:
+    """Return the hash of a user-defined solver's source file; None without a file, as in a notebook, or if it is ours."""
+    kind = solver if inspect.isroutine(solver) else type(solver)
+    if kind.__module__.partition(".")[0] == "metaheuristics":
+        return None
+    try:
+        path = inspect.getsourcefile(kind)
+    except (TypeError, OSError):
+        return None
+    return hash_file(Path(path)) if path is not None and Path(path).is_file() else None
 
 
 def describe_problem(problem: GaitProblem) -> dict[str, Any]:

@@ -1,11 +1,11 @@
-"""Results: a point of a problem, read from the file of `solve --out`, a study's record or a few lines by hand; its signals."""
+"""Results: a point of a problem, read from the file of `solve --out` or a few lines by hand; its signals."""
 
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -35,7 +35,7 @@ class StoredProbe:
 
 @dataclass(frozen=True, kw_only=True)
 class StoredProblem:
-    """A problem in a certificate or a study's record."""
+    """A problem in a certificate or another stored result."""
 
     name: str  # argument of ``load``
     options: Mapping[str, str | int | float | bool]  # of its maker
@@ -43,15 +43,6 @@ class StoredProblem:
     mathematics: int = 1  # version of the formulas
     files: Mapping[str, str] = field(default_factory=dict)  # hashes of the files that options name
     probes: tuple[StoredProbe, ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
-class _RecordFile:
-    """Keys of a study's record that are read here."""
-
-    schema: Literal[4]
-    definition: Mapping[str, Any]
-    x: Mapping[str, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,12 +72,10 @@ def load_result(path: Path) -> Result:
     """
     raw = read_json(path, "result")
     with explain_errors(f"result {str(path)!r}", "`nlp-gait solve ... --out FILE` writes a valid one"):
-        if isinstance(raw, dict) and "definition" in raw:
-            record = decode(_RecordFile, raw, ignore_unknown=True)
-            stored = decode(StoredProblem, record.definition.get("problem"), "definition.problem")
-            return _make_result(stored.name, stored.options, stored.parameters, record.x)
         file = decode(_ResultFile, raw, ignore_unknown=True)
-        result = _make_result(file.problem, file.options, file.parameters, file.x)
+        name, options = resolve_stored(file.problem, file.options, "it")
+        problem = load(name, **options).with_values(**file.parameters)
+        result = Result(problem=problem, x=problem.check_x(file.x))
         if file.robot not in (None, result.problem.options.get("robot")):
             raise InputError(f"'robot' is {file.robot!r}, but the option of that name decides: write it into 'options'")
         return result
@@ -101,14 +90,6 @@ def explain_errors(owner: str, remedy: str) -> Iterator[None]:
         raise InputError(f"{owner}: {error}; {remedy}") from error
     except GaitError as error:
         raise InputError(f"{owner}: {error}") from error
-
-
-def _make_result(
-    name: str, options: Mapping[str, str | int | float | bool], parameters: Mapping[str, float], x: Mapping[str, float]
-) -> Result:
-    name, options = resolve_stored(name, options, "it")
-    problem = load(name, **options).with_values(**parameters)
-    return Result(problem=problem, x=problem.check_x(x))
 
 
 def sample_signals(result: Result, period_s: float) -> Signals:

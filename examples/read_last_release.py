@@ -1,0 +1,38 @@
+"""Read a study of the last release: write its records, of schema 3 or 4, as records of this one.
+
+Points are judged again when the new records are read; the report excludes those whose problem has changed.
+
+    python examples/read_last_release.py old new
+    nlp-gait report new
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from compare.study.record import SCHEMA, RunRecord, parse_record
+from compare.study.record_files import write_records
+from compare.study.task import ProblemSpec
+from nlp_gait.backends.identity import identify_problem
+
+
+def convert(old: dict[str, Any]) -> RunRecord:
+    """Return the record; raises ValueError for anything else, and GaitError if its problem is gone."""
+    inputs, origin = old.pop("definition"), old["origin"]
+    problem = inputs["problem"]
+    spec = ProblemSpec(name=problem["name"], options=problem["options"], values=problem["parameters"])
+    inputs["problem"] = identify_problem(spec.load())
+    inputs["code"] = origin.pop("code_sha256") if origin else ""
+    inputs["stop"] = {key: value for key, value in (inputs.get("stop") or {}).items() if value is not None}
+    inputs["imported"] = (inputs.get("imported") or {}).get("sha256", "")
+    if polishes := inputs.pop("polishes", None):
+        inputs |= {"polish": True, "solver": polishes["solver"], "handling": polishes["handling"]}
+    del old["seed"]
+    return parse_record({**old, "inputs": inputs, "schema": SCHEMA})
+
+
+if __name__ == "__main__":
+    source, target = map(Path, sys.argv[1:])
+    paths = sorted((source / "records").glob("*/*.json"))
+    write_records([convert(json.loads(path.read_text(encoding="utf-8"))) for path in paths], target)
