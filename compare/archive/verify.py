@@ -16,6 +16,7 @@ from compare.report.writing import render_markdown
 from compare.study.evidence import name_record, read_evidence
 from compare.study.origin import hash_installed_code
 from compare.study.record import RunRecord, load_problem
+from compare.study.record_files import RECORDS
 from compare.study.run_task import try_task
 from compare.study.settings import FILE, Manifest, read_manifest
 from compare.study.simulations import load_simulations
@@ -95,6 +96,7 @@ def verify_folder(
     )
     findings = [Finding("records", not excluded, detail + ", also between the samples" * (not excluded))]
     findings.append(_judge(FILE, lambda: _check_sessions(records, read_manifest(folder))))
+    findings.append(_judge("runs", lambda: _check_runs(folder)))
     for path in sorted((folder / "certificates").glob("*.json")):
         findings.append(_judge(f"certificates/{path.name}", partial(_check_certificate, path)))
     if share > 0.0:
@@ -134,6 +136,15 @@ def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> str:
     other = any(record.inputs.code != installed for record, _ in own)
     note = f"; other code is installed here ({installed[:8]}), so runs cannot be repeated" if other else ""
     return f"runs computed in a recorded session: {len(own)} of {len(own)}{note}"
+
+
+def _check_runs(folder: Path) -> str:
+    """Require a record of every run of the study."""
+    runs = read_manifest(folder).runs
+    missing = [name for name in runs if not (folder / RECORDS / f"{name}.json").is_file()]
+    if missing:
+        raise InputError(f"{len(missing)} of {len(runs)} have no record: {', '.join(missing)}")
+    return f"all {len(runs)} that {FILE} lists have a record"
 
 
 def _check_certificate(path: Path) -> str:

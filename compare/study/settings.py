@@ -224,7 +224,7 @@ class Manifest:
 
     settings: StudySettings | None  #: of the study that a command ran last; None without one
     sessions: tuple[Session, ...]
-    runs: tuple[str, ...]  #: that belong to the study: names of their records without suffix
+    runs: tuple[str, ...] = ()  #: that belong to the study: names of their records without suffix
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from compare.judge import evaluate
 from compare.study.record import History, RunRecord, Times, Verdict
-from compare.study.task import ProblemSpec, Stop, Task
+from compare.study.task import Handling, Inputs, ProblemSpec, Stop, Task
+from nlp_gait.formulation import Objective
 from nlp_gait.formulation.solution import ActiveConstraint
 
 # A point of nao-dsp that can be played.
@@ -23,7 +23,7 @@ DSP_X = {
     "double_support_time_s": 0.4,
 }
 
-POWER = {"name": "power", "unit": "W", "sense": "minimise"}
+POWER = Objective(name="power", unit="W", sense="minimise")
 
 
 def record(
@@ -39,29 +39,27 @@ def record(
     seconds_per_evaluation: float = 0.01,
     evaluations: dict[str, int] | None = None,
     search: bool = True,
-    objective: dict[str, str] = POWER,
+    objective: Objective = POWER,
     active: tuple[ActiveConstraint, ...] = (),
     violated: tuple[str, ...] = (),
     dense_feasible: bool | None = True,
 ) -> RunRecord:
     """A run of two variables with a history of (evaluations, best objective so far)."""
     value = next((v for _, v in reversed(history) if v is not None), None)
-    definition: dict[str, Any] = {
-        "problem": {"name": problem, "options": {}, "parameters": {}},
-        "objective": objective,
-        "solver": solver,
-        "settings": {},
-        "seed": run,
-    }
-    if search:
-        definition["handling"] = {"name": "deb", "settings": {}}
+    inputs = Inputs(
+        problem={"name": problem, "options": {}, "parameters": {}},
+        objective=objective,
+        solver=solver,
+        settings={},
+        seed=run,
+        handling=Handling() if search else None,
+    )
     seconds = tuple(count * seconds_per_evaluation for count, _ in history)
     return RunRecord(
         problem=problem,
         solver=solver,
         run=run,
-        seed=run,
-        definition=definition,
+        inputs=inputs,
         settings={"kind": solver},
         status=status,
         claimed=claimed,

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from compare.study.record import read_record
-from compare.study.record_files import locate_record, write_record
+from compare.study.record_files import locate_record, write_records
 from compare.study.run_study import Study, run_study
 from compare.study.settings import Session, SolverSpec, StudySettings, write_manifest
 from compare.study.store import Store
@@ -99,19 +99,16 @@ def write_arrays(folder: Path, finished: Finished) -> None:
 
 
 def run_a_study(folder: Path, finished: Finished) -> None:
-    def run(task: Task, _: object) -> Any:
-        return replace(record("random", task.run, [(9, 1.0)], problem="walk12"), definition=task.definition())
-
     tasks = tuple(Task(problem=WALK, solver="random", run=run, stop=Stop(evaluations=100)) for run in range(2))
-    run_study(Study(tasks=tasks, folder=folder, run=run), lambda task, _: finished(locate_record(folder, task)))
+    run_study(Study(tasks=tasks, folder=folder), lambda task, _: finished(locate_record(folder, task)))
 
 
-def write_a_record_of_another_definition(folder: Path, finished: Finished) -> None:
-    old = record("pso", 0, [(9, 1.0)])
-    finished(write_record(old, folder))
-    path = write_record(replace(old, definition={**old.definition, "stop": {"evaluations": 10}}), folder)
-    for file in path.parent.glob("*.json"):
-        finished(file)
+def write_runs_of_other_settings(folder: Path, finished: Finished) -> None:
+    run = record("pso", 0, [(9, 1.0)])
+    for settings in ({}, {"population": 9}):
+        (path,) = write_records([replace(run, inputs=replace(run.inputs, settings=settings))], folder)
+        finished(path)
+        finished(folder / "study.json")
 
 
 def store_results(folder: Path, finished: Finished) -> None:
@@ -182,7 +179,7 @@ class Journal:
         write_into_new_folders,
         write_arrays,
         run_a_study,
-        write_a_record_of_another_definition,
+        write_runs_of_other_settings,
         store_results,
         write_sessions,
         store_a_library,

@@ -16,7 +16,8 @@ from compare.study.record import parse_record
 from compare.study.record_files import RECORDS, read_records
 from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.task import ProblemSpec, Stop
+from compare.study.task import KEY_DIGITS, ProblemSpec, Stop
+from nlp_gait.errors import GaitError
 
 Raw = dict[str, Any]
 Records = dict[str, Raw]  # plain records by the name of their file, such as pso-0001
@@ -57,7 +58,7 @@ def other_probe(factor: float = 1 + 1e-8) -> Callable[[float], float]:
     return lambda f: f * factor
 
 
-PROBLEM = "definition.problem."
+PROBLEM = "inputs.problem."
 OF_ANY_SOLVER: dict[str, tuple[Change, ...]] = {
     **{
         f"objective times {k}": (("verdict.objective", lambda v, k=k: v * k),)  # type: ignore[misc]
@@ -81,7 +82,7 @@ OF_ANY_SOLVER: dict[str, tuple[Change, ...]] = {
     "formulas of another version": ((PROBLEM + "mathematics", 2),),
     "another problem": ((PROBLEM + "name", "nao-ssp"),),
     "code of the forger": ((PROBLEM + "name", "forger.py:walk"),),
-    "the other sense": (("definition.objective.sense", "minimise"),),
+    "the other sense": (("inputs.objective.sense", "minimise"),),
     "a schema of the future": (("schema", 9),),
     "an unknown key": (("verdikt", True),),
     "fewer evaluations": (("evaluations.f", lambda f: f - 1),),
@@ -100,16 +101,15 @@ OF_A_SEARCH: dict[str, tuple[Change, ...]] = {
     "evaluations that descend": (("history.evaluations.1", 1),),
     "a history longer than its run": (("time_s.history.-1", 1e6),),
     "times that descend": (("time_s.history.0", 0.5),),
-    "a budget that was exceeded": (("definition.stop.evaluations", 100),),
+    "a budget that was exceeded": (("inputs.stop.evaluations", 100),),
     "a better claim": (("claimed_objective", 0.93),),
     "a claim withdrawn": (("claimed", False),),
     "a claim with a violation": (("claimed_violation", 0.5),),
     "more iterations than evaluations": (("iterations", 10**9),),
     "other settings": (("settings.population", 7),),
     "no origin": (("origin", None),),
-    "other code": (("origin.code_sha256", "f" * 64),),
+    "other code": (("inputs.code", "f" * 64),),
     "another CasADi and probe": (("origin.casadi", "1.0"), (PROBLEM + "probes.0.objective", other_probe())),
-    "seed and definition disagree": (("seed", 99),),
 }
 BETWEEN_SAMPLES: dict[str, tuple[Change, ...]] = {  # noticed by a complete verification only
     "a dense grid that fails": (("verdict.dense_feasible", lambda v: not v),),
@@ -118,7 +118,7 @@ BETWEEN_SAMPLES: dict[str, tuple[Change, ...]] = {  # noticed by a complete veri
     "no guarantee": (("verdict.guaranteed", None),),
     "a guarantee withdrawn": (("verdict.guaranteed.satisfied", lambda v: not v),),
 }
-OTHER_SEED: tuple[Change, ...] = (("run", 7), ("seed", 7), ("definition.seed", 7))
+OTHER_SEED: tuple[Change, ...] = (("run", 7), ("inputs.seed", 7))
 OTHER_TIMES: tuple[Change, ...] = (("time_s.solve", lambda t: t + 0.01), ("time_s.history.-1", lambda t: t + 0.005))
 COPIES: dict[str, tuple[str, tuple[Change, ...]]] = {  # file of a copy of pso-0001, and what is changed in it
     "a copy with its seed": ("pso-0007", (("run", 7),)),
@@ -159,13 +159,21 @@ def honest(tmp_path_factory: pytest.TempPathFactory) -> Records:
     folder = tmp_path_factory.mktemp("study")
     run_study(Study(tasks=STUDY.tasks(), folder=folder))
     assert read_evidence(folder, "all").excluded == []
-    return {path.stem: json.loads(path.read_text()) for path in folder.glob(f"{RECORDS}/*/*.json")}
+    return {path.stem[: -KEY_DIGITS - 1]: json.loads(path.read_text()) for path in folder.glob(f"{RECORDS}/*/*.json")}
+
+
+def find_key(raw: Raw) -> str:
+    """Return the key with which a careful forger names the file."""
+    try:
+        return parse_record({**raw, "status": ""}).inputs.key
+    except (GaitError, ValueError):
+        return "0" * KEY_DIGITS
 
 
 def compare_files(records: Records, folder: Path, scope: Scope = "best") -> tuple[Comparison, list[str]]:
+    (folder / RECORDS / "walk12").mkdir(parents=True)
     for name, raw in records.items():
-        (folder / RECORDS / "walk12").mkdir(parents=True, exist_ok=True)
-        (folder / RECORDS / "walk12" / f"{name}.json").write_text(json.dumps(raw))
+        (folder / RECORDS / "walk12" / f"{name}-{find_key(raw)}.json").write_text(json.dumps(raw))
     evidence = read_evidence(folder, scope)
     return compare_problems(evidence.records)[0], [exclusion.sentence for exclusion in evidence.excluded]
 
@@ -184,15 +192,29 @@ def test_a_forged_record_is_named_and_without_influence(
 ) -> None:
     found, sentences = compare_files(forge(honest, victim, changes), tmp_path, scope)
     solver, run = victim.split("-")
-    names = (f"walk12, {solver}, run {int(run)}:", f"{RECORDS}/walk12/{victim}.json:")
+    names = (f"walk12, {solver}, run {int(run)}:", f"{RECORDS}/walk12/{victim}-")
     assert len(sentences) == 1 and sentences[0].startswith(names), sentences
     rest = [parse_record(raw) for name, raw in sorted(honest.items()) if name != victim]
     assert describe(found) == describe(compare_problems(rest)[0])
 
 
+@pytest.mark.parametrize(
+    "change", [("inputs.seed", 99), ("inputs.stop.evaluations", 399), ("solver", "mine"), ("run", 2)]
+)
+def test_a_record_whose_inputs_do_not_fit_the_name_of_its_file_is_named(
+    change: Change, honest: Records, tmp_path: Path
+) -> None:
+    folder = tmp_path / RECORDS / "walk12"
+    folder.mkdir(parents=True)
+    for name, raw in forge(honest, "pso-0001", (change,)).items():
+        (folder / f"{name}-{find_key(honest[name])}.json").write_text(json.dumps(raw))
+    (excluded,) = read_evidence(tmp_path).excluded
+    assert excluded.name.startswith(f"{RECORDS}/walk12/pso-0001-") and "belongs to walk12/" in excluded.sentence
+
+
 def test_a_forged_record_is_computed_again_when_the_study_continues(honest: Records, tmp_path: Path) -> None:
     forged = forge(honest, "pso-0001", (("verdict.objective", 0.99),))
-    compare_files(forge(forged, "pso-0002", (("origin.code_sha256", "f" * 64),)), tmp_path)
+    compare_files(forge(forged, "pso-0002", (("origin.casadi", "1.0"),)), tmp_path)
     said: list[str] = []
     run_study(Study(tasks=STUDY.tasks(), folder=tmp_path), on_outdated=said.append)
     assert len(said) == 2 and "its objective is 0.99" in said[0] and "other code" in said[1]

@@ -28,16 +28,16 @@ def write_study(folder: Path, study: int, barrier: Barrier, seed: int) -> None:
     barrier.wait(60)
     for run, record in enumerate(records):
         write_record(record, folder)
-        found, _ = find_record(folder, make_task(study, draw.randrange(run + 1)))
-        assert found is not None and found.definition["stop"]["evaluations"] == 50 + study
-        assert len(read_records(folder)) > run  # as for the report, while others rename
+        found = find_record(folder, make_task(study, draw.randrange(run + 1)))
+        assert found is not None and found.inputs.stop["evaluations"] == 50 + study
+        assert len(read_records(folder)) > run  # as for the report, while others write
 
 
 @pytest.mark.slow
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="processes cannot be copied here")
 def test_several_studies_in_one_folder_lose_nothing(tmp_path: Path) -> None:
     SPEC.load()
-    make_task(0, 0).definition()  # built before the forks
+    make_task(0, 0).inputs()  # built before the forks
     context = multiprocessing.get_context("fork")
     studies = [*range(STUDIES), 0]  # one of them twice
     barrier = context.Barrier(len(studies))
@@ -47,6 +47,6 @@ def test_several_studies_in_one_folder_lose_nothing(tmp_path: Path) -> None:
     for job in jobs:
         job.join()
     assert [job.exitcode for job in jobs] == [0] * len(jobs)
-    found = {(r.definition["stop"]["evaluations"], r.run) for r in read_records(tmp_path)}
+    found = {(r.inputs.stop["evaluations"], r.run) for r in read_records(tmp_path)}
     assert found == {(50 + study, run) for study in range(STUDIES) for run in range(RUNS)}
     assert len(read_records(tmp_path)) == STUDIES * RUNS

@@ -76,7 +76,7 @@ def test_no_result_of_a_run_makes_a_record_that_cannot_be_read(tmp_path: Path, m
     attacks = list(hostile_results(sound, 1))
     failed = 0
     for make in attacks:
-        record = try_task(TASK, run=lambda task, start, make=make: make())
+        record = try_task(TASK, run=lambda task, make=make: make())
         path = write_record(record, tmp_path)
         read = read_record(path)
         assert read.to_json() == json.loads(path.read_text(encoding="utf-8"))

@@ -99,14 +99,11 @@ def test_every_option_is_recorded(name: str) -> None:
 
 
 @pytest.mark.parametrize("option", others("walk12"))
-def test_definitions_of_tasks_depend_on_each_option(option: str) -> None:
+def test_the_inputs_of_a_run_have_each_option(option: str) -> None:
     asked = make_task("walk12", {option: others("walk12")[option]})
     problem = asked.problem.load()
-    assert (
-        make_task(problem.name, problem.options).definition()
-        == asked.definition()
-        != make_task("walk12", {}).definition()
-    )
+    assert make_task(problem.name, problem.options).inputs() == asked.inputs()
+    assert asked.inputs().key != make_task("walk12", {}).inputs().key
 
 
 # The cycle stands for the humanoid's other problems, which take the same bodies and phases.
@@ -116,13 +113,14 @@ RELOADED = [name for name in PROBLEMS if name == "humanoid-cycle" or not name.st
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RELOADED)
 def test_recorded_options_make_the_same_problem(name: str) -> None:
-    """With no option at its default: grid, definitions of tasks, rows, and every exact value at a point off the middle."""
+    """With no option at its default: grid, inputs of runs, rows, and every exact value at a point off the middle."""
     asked = make_task(name, others(name))
     problem = asked.problem.load()
     recorded = make_task(problem.name, problem.options)
     again = recorded.problem.load()
     assert (again.options, again.grid) == (problem.options, problem.grid)
-    assert recorded.definition() == asked.definition() != make_task(name, {}).definition()
+    assert recorded.inputs() == asked.inputs()
+    assert asked.inputs().key != make_task(name, {}).inputs().key
     assert build_exact_model(again).row_names == build_exact_model(problem).row_names
     x = problem.lower + 0.4 * (problem.upper - problem.lower)
     here, there = evaluated(problem, x), evaluated(again, x)

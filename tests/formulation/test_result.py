@@ -80,11 +80,10 @@ def test_damaged_files_are_refused_by_name(tmp_path, data, words):
 
 
 def test_keys_that_are_not_needed_are_ignored_and_misspelled_ones_are_not(tmp_path):
-    definition = {"problem": {"name": "nao-dsp", "options": {"robot": "nao-v6"}, "parameters": {}}}
-    record = {"schema": 4, "definition": definition, "x": X, "status": "converged"}
-    assert load_result(written(tmp_path, record)).problem.options["robot"] == "nao-v6"
-    with pytest.raises(InputError, match="unknown key 'definitions'"):
-        load_result(written(tmp_path, record | {"definitions": {}}))
+    stated = {"problem": "nao-dsp", "options": {"robot": "nao-v6"}, "x": X, "status": "converged"}
+    assert load_result(written(tmp_path, stated)).problem.options["robot"] == "nao-v6"
+    with pytest.raises(InputError, match="unknown key 'option'; did you mean 'options'"):
+        load_result(written(tmp_path, stated | {"option": {}}))
 
 
 def test_an_absent_file_is_refused(tmp_path):

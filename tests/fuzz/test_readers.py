@@ -35,10 +35,9 @@ INPUTS, RESULT = {"seed": 1}, {"runs": [{"x": [0.1, 0.2], "status": "converged"}
 def read_a_result(path: Path) -> None:
     """All of the file that describes the problem is in the result."""
     result, raw = load_result(path), json.loads(path.read_text())
-    kept = raw["definition"]["problem"] if "definition" in raw else raw
     assert raw["x"] == result.problem.by_name(result.x)
-    assert kept.get("options", {}).items() <= dict(result.problem.options).items()
-    assert kept.get("parameters", {}) == dict(result.problem.values)
+    assert raw.get("options", {}).items() <= dict(result.problem.options).items()
+    assert raw.get("parameters", {}) == dict(result.problem.values)
 
 
 def read_a_record(path: Path) -> None:
@@ -196,8 +195,8 @@ def test_a_link_to_a_file_is_read_and_a_huge_one_is_not(name: str, tmp_path: Pat
 
 VERSIONED = {
     "result": (b'"schema": 1', (b'"schema": 0', b'"schema": 2', b'"schema": true', b'"schema": "1"')),
-    "record": (b'"schema": 4', (b'"schema": 3', b'"schema": 5', b'"schema": 4.0', b'"scheme": 4')),
-    "manifest": (b'"schema": 1', (b'"schema": 0', b'"schema": 2', b'"schema": true', b'"scheme": 1')),
+    "record": (b'"schema": 5', (b'"schema": 4', b'"schema": 6', b'"schema": 5.0', b'"scheme": 5')),
+    "manifest": (b'"schema": 2', (b'"schema": 1', b'"schema": 3', b'"schema": true', b'"scheme": 2')),
     "study": (b"schema = 1", (b"schema = 0", b"schema = 2", b"schema = true", b'schema = "1"')),
     "robot": (b'"schema": 1', (b'"schema": 0', b'"schema": 2', b'"schema": true', b'"scheme": 1')),
 }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -54,12 +53,11 @@ def hostile_report() -> tuple[Page, str]:
     """Report of a study in which every text that a user or a file can bring in holds markup."""
     records = []
     for record in study():
-        definition = json.loads(json.dumps(record.definition))
-        definition["problem"] |= {"options": {"robot": f"{MARKED}.json"}, "parameters": {MARKED: 1.0}}
+        problem = {**record.inputs.problem, "options": {"robot": f"{MARKED}.json"}, "parameters": {MARKED: 1.0}}
         records.append(
             replace(
                 record,
-                definition=definition,
+                inputs=replace(record.inputs, problem=problem),
                 settings={"kind": MARKED, MARKED: 1},
                 status=MARKED,
                 verdict=replace(record.verdict, violated=(MARKED,), indexes={MARKED: 1.0}),

@@ -25,10 +25,9 @@ def comparisons() -> list[Comparison]:
         for solver, value in zip(SOLVERS, values, strict=True):
             for run in range(8):
                 made = record(solver, run, [(10, value + 1e-3 * run)])
-                definition = dict(made.definition)
-                if solver == "mine":
-                    definition["solver"] = {"name": "my.py:mine", "source_sha256": "0" * 64}
-                records.append(replace(made, problem=problem, definition=definition))
+                code = {"name": "my.py:mine", "source_sha256": "0" * 64}
+                inputs = replace(made.inputs, solver=code) if solver == "mine" else made.inputs
+                records.append(replace(made, problem=problem, inputs=inputs))
     return compare_problems(records)
 
 

@@ -9,12 +9,11 @@ import pytest
 
 import nlp_gait
 from compare.papers.paper_runs import Runner, choose_best, make_start_tasks
-from compare.study.record import RunRecord
 from compare.study.run_task import run_task
 from compare.study.task import ProblemSpec, Task, check_task
 from nlp_gait.errors import InputError
 from nlp_gait.progress import ignore_progress
-from tests.compare.records import record
+from tests.compare.records import POWER, record
 
 WALK = ProblemSpec(name="walk12")
 
@@ -34,17 +33,19 @@ def test_the_best_run_succeeds_before_it_is_cheap() -> None:
         runs[3], claimed=False, verdict=replace(runs[3].verdict, feasible=False, violation=1.0, objective=0.5)
     )
     assert choose_best(runs) is runs[1] and choose_best(runs[2:]) is runs[2]
-    maximised = [replace(r, definition={"objective": {"sense": "maximise"}}) for r in runs[:2]]
+    maximised = [replace(r, inputs=replace(r.inputs, objective=replace(POWER, sense="maximise"))) for r in runs[:2]]
     assert choose_best(maximised) is maximised[0]
 
 
-def no_luck(task: Task, start: RunRecord | None) -> RunRecord:
+def no_luck(*arguments: object) -> None:
     raise ValueError("no luck")
 
 
 def test_a_run_without_a_point_ends_the_reproduction_and_says_why(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="walk12/ipopt-0000 failed: ValueError: no luck; fix this and delete"):
-        Runner(folder=tmp_path, progress=ignore_progress, jobs=1).run_tasks(make_start_tasks(WALK, 1), no_luck)
+    with pytest.raises(
+        InputError, match="walk12/no_luck-0000-[0-9a-f]{8} failed: ValueError: no luck; fix this and delete"
+    ):
+        Runner(folder=tmp_path, progress=ignore_progress, jobs=1).run_tasks([Task(problem=WALK, solver=no_luck)])
 
 
 def test_a_start_point_is_for_nlp_solvers() -> None:

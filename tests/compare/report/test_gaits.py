@@ -18,7 +18,7 @@ from tests.compare.records import DSP_X, record, study
 def comparison(name: str, x: dict[str, float], *solvers: str) -> Comparison:
     records = [record(solver, 0, [(1, 0.5)], problem="dsp") for solver in solvers]
     stored = {"name": name, "options": {}, "parameters": {}}
-    changed = [replace(r, x=x, definition={**r.definition, "problem": stored}) for r in records]
+    changed = [replace(r, x=x, inputs=replace(r.inputs, problem=stored)) for r in records]
     return compare_problems(changed)[0]
 
 

@@ -41,7 +41,7 @@ def gaits() -> list[RunRecord]:
     stored = {"name": "nao-dsp", "options": {}, "parameters": {}}
     other = DSP_X | {"hip_height_m": 0.30}
     return [
-        replace(r, x=x, definition={**r.definition, "problem": stored})
+        replace(r, x=x, inputs=replace(r.inputs, problem=stored))
         for solver, x, power in (("pso", DSP_X, 0.5), ("ga", other, 0.6))
         for r in [record(solver, 0, [(1, 0.9), (50, power)], problem="dsp")]
     ]

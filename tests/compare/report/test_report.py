@@ -20,6 +20,7 @@ from compare.report.study_report import make_study_document
 from compare.study.record_files import write_record
 from compare.study.settings import Manifest, Session
 from nlp_gait.errors import InputError
+from nlp_gait.formulation import Objective
 from tests.compare.records import FAST_X, judged, record, study
 
 SESSION = Session(
@@ -199,15 +200,17 @@ def test_rebuilding_gives_the_same_report_and_names_what_is_no_evidence(tmp_path
     assert again.below("solver", "evaluations")[0][1] == "30"
 
 
+MARGIN = Objective(name="margin", unit="m", sense="maximise")
+
+
 def test_records_that_disagree_on_the_objective_are_refused(tmp_path: Path) -> None:
-    other = record("pso", 1, [(10, 1.0)], objective={"name": "margin", "unit": "m", "sense": "maximise"})
+    other = record("pso", 1, [(10, 1.0)], objective=MARGIN)
     with pytest.raises(InputError, match="disagree on the objective"):
         compare_problems([record("pso", 0, [(10, 1.0)]), other])
 
 
 def test_maximised_objectives_are_ranked_the_other_way() -> None:
-    margin = {"name": "margin", "unit": "m", "sense": "maximise"}
-    runs = [record("pso", run, [(10, value)], objective=margin) for run, value in enumerate((0.1, 0.2, 0.4))]
+    runs = [record("pso", run, [(10, value)], objective=MARGIN) for run, value in enumerate((0.1, 0.2, 0.4))]
     (summary,) = summarise(compare_problems(runs)[0])
     assert (summary["best"], summary["median"], summary["worst"]) == (0.4, 0.2, 0.1)
     assert summary["median_gap"] == pytest.approx(0.5)

@@ -20,6 +20,7 @@ from nlp_gait.backends.solvers.registry import make_solver
 from nlp_gait.backends.solvers.solver import IterationWatch
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem
+from tests.compare.records import POWER
 
 SSP = ProblemSpec(name="nao-ssp")
 OPTIMUM = 0.845868
@@ -119,4 +120,4 @@ def test_a_run_does_not_depend_on_how_many_others_a_study_has(monkeypatch: pytes
 def test_a_gradient_run_charges_all_its_calls() -> None:
     record = run_task(Task(problem=SSP, solver="ipopt"))
     assert record.history.evaluations == (record.evaluations["f"],) and record.active_constraints
-    assert record.definition["objective"] == {"name": "power", "unit": "W", "sense": "minimise"}
+    assert record.inputs.objective == POWER

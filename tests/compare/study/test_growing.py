@@ -1,4 +1,4 @@
-"""A study grows in its folder: records are kept by what they depend on, and nothing is deleted."""
+"""A study grows in its folder: a run's file is named after its inputs; ``study.json`` lists those that belong to it."""
 
 from __future__ import annotations
 
@@ -8,90 +8,104 @@ import sys
 import types
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from compare.study.definition import hash_solver_source
+from compare.study.evidence import read_evidence
 from compare.study.record import RunRecord
-from compare.study.record_files import locate_record, read_records
+from compare.study.record_files import RECORDS, locate_record, read_records
 from compare.study.run_study import Study, run_study
-from compare.study.settings import SolverSpec, StudySettings
-from compare.study.task import ProblemSpec, Stop
+from compare.study.settings import SolverSpec, StudySettings, read_manifest
+from compare.study.task import Handling, ProblemSpec, Stop, Task, hash_solver_source
 from nlp_gait.errors import InputError
 from tests.robots.custom import humanoid
 
-STUDY = StudySettings(
-    problems=(ProblemSpec(name="walk12"),),
-    solvers=(SolverSpec(name="pso"), SolverSpec(name="ga")),
-    runs=2,
-    stop=Stop(evaluations=200),
-)
+PSO, GA = SolverSpec(name="pso"), SolverSpec(name="ga")
+STUDY = StudySettings(problems=(ProblemSpec(name="walk12"),), solvers=(PSO, GA), runs=2, stop=Stop(evaluations=200))
 
 
-def grown(folder: Path, settings: StudySettings) -> tuple[list[RunRecord], int, list[str]]:
-    """Records, how many were kept, and what is reported of runs that are recomputed."""
-    kept: list[int] = []
-    said: list[str] = []
-    records = run_study(Study(tasks=settings.tasks(), folder=folder), on_stored=kept.append, on_outdated=said.append)
-    return records, kept[0], said
+def grow(folder: Path, settings: StudySettings) -> tuple[list[RunRecord], int]:
+    """Return the records of a study, and how many of them were stored before."""
+    stored: list[int] = []
+    records = run_study(Study(tasks=settings.tasks(), folder=folder), on_stored=stored.append)
+    return records, stored[0]
+
+
+def count_files(folder: Path) -> int:
+    return len(list((folder / RECORDS).rglob("*.json")))
 
 
 def test_more_runs_solvers_and_problems_continue_what_is_there(tmp_path: Path) -> None:
-    assert grown(tmp_path, STUDY)[1:] == (0, [])
-    assert grown(tmp_path, replace(STUDY, runs=4))[1:] == (4, [])
-    assert grown(tmp_path, replace(STUDY, solvers=(*STUDY.solvers, SolverSpec(name="de"))))[1:] == (4, [])
-    small = ProblemSpec(name="walk12", label="slow", values={"lambda": 1.0})
-    assert grown(tmp_path, replace(STUDY, problems=(*STUDY.problems, small)))[1:] == (4, [])
-    assert len(read_records(tmp_path)) == 8 + 2 + 4
+    assert grow(tmp_path, STUDY)[1] == 0
+    assert grow(tmp_path, replace(STUDY, runs=4))[1] == 4
+    assert grow(tmp_path, replace(STUDY, solvers=(PSO, GA, SolverSpec(name="de"))))[1] == 4
+    slow = ProblemSpec(name="walk12", label="slow", values={"lambda": 1.0})
+    assert grow(tmp_path, replace(STUDY, problems=(*STUDY.problems, slow)))[1] == 4
+    assert count_files(tmp_path) == 8 + 2 + 4
 
 
-def test_records_of_other_code_stay_until_a_run_is_missing_and_are_recomputed_once(tmp_path: Path) -> None:
-    settings = replace(STUDY, solvers=STUDY.solvers[:1], stop=Stop(evaluations=50))
-    grown(tmp_path, settings)
-    for path in (tmp_path / "records" / "walk12").glob("*.json"):
-        record = json.loads(path.read_text())
-        record["origin"]["code_sha256"] = "f" * 64
-        path.write_text(json.dumps(record))
-    assert grown(tmp_path, settings)[1:] == (2, [])
-    more = replace(settings, runs=3)
-    _, kept, said = grown(tmp_path, more)
-    assert (
-        kept == 0
-        and len(said) == 1
-        and said[0].startswith("pso on walk12: 2 runs recomputed: it was computed by other")
-    )
-    assert grown(tmp_path, more)[1:] == (3, [])
+CHANGES: dict[str, dict[str, Any]] = {
+    "budget": {"stop": Stop(evaluations=300)},
+    "target": {"stop": Stop(evaluations=200, target=0.99)},
+    "seed": {"seed": 7},
+    "handling": {"handling": Handling(name="epsilon")},
+    "settings": {"solvers": (SolverSpec(name="pso", settings={"population": 20}),)},
+    "parameter": {"problems": (ProblemSpec(name="walk12", values={"lambda": 0.5}),)},
+    "option": {"problems": (ProblemSpec(name="walk12", options={"intervals": 10}),)},
+}
 
 
-def test_a_larger_budget_is_another_run_and_the_smaller_ones_stay(tmp_path: Path) -> None:
-    first = grown(tmp_path, STUDY)[0]
-    more = replace(STUDY, stop=Stop(evaluations=300))
-    records, kept, said = grown(tmp_path, more)
-    assert kept == 0 and said == [f"{s} on walk12: 2 runs recomputed: evaluations 200 -> 300" for s in ("pso", "ga")]
-    assert {r.evaluations["f"] for r in records} == {300}
-    assert sorted(r.evaluations["f"] for r in read_records(tmp_path)) == [200] * 4 + [300] * 4
-    again, kept, said = grown(tmp_path, STUDY)
-    assert kept == 4 and not said and again == first
+@pytest.mark.parametrize("change", CHANGES)
+def test_other_inputs_never_overwrite_a_run_and_the_report_shows_the_latest(change: str, tmp_path: Path) -> None:
+    """The same command as before finds its runs again, and lists them."""
+    first = replace(STUDY, solvers=(PSO,), runs=1)
+    other = replace(first, **CHANGES[change])
+    begun, _ = grow(tmp_path, first)
+    records, stored = grow(tmp_path, other)
+    assert stored == 0 and count_files(tmp_path) == 2
+    assert read_records(tmp_path) == records != begun
+    assert grow(tmp_path, first) == (begun, 1)
+    evidence = read_evidence(tmp_path)
+    assert evidence.records == begun and not evidence.excluded
 
 
-def test_a_solver_that_is_left_out_is_hidden_and_stays_stored(tmp_path: Path) -> None:
-    grown(tmp_path, STUDY)
-    records, kept, _ = grown(tmp_path, replace(STUDY, solvers=STUDY.solvers[:1]))
-    assert {r.solver for r in records} == {"pso"} and kept == 2
+def test_another_version_of_the_code_is_another_input(tmp_path: Path) -> None:
+    (task,) = replace(STUDY, solvers=(PSO,), runs=1).tasks()
+    (tmp_path / "mine.py").write_text("def search(f, lower, upper, evaluations, seed): f(lower[None])\n")
+    mine = replace(task, solver=f"{tmp_path}/mine.py:search")
+    polished = replace(task, polish=True)
+    keys = {task.inputs().key, replace(task.inputs(), code="f" * 64).key, mine.inputs().key, polished.inputs().key}
+    (tmp_path / "mine.py").write_text("def search(f, lower, upper, evaluations, seed): f(upper[None])\n")
+    edited = mine.inputs().key
+    assert len({*keys, edited}) == 5
+    (tmp_path / "mine.py").write_text("def search(f, lower, upper, evaluations, seed): f(upper[None])  # a remark\n")
+    assert mine.inputs().key == edited
+
+
+def test_a_solver_that_is_left_out_stays_in_the_report(tmp_path: Path) -> None:
+    grow(tmp_path, STUDY)
+    records, stored = grow(tmp_path, replace(STUDY, solvers=(PSO,)))
+    assert {r.solver for r in records} == {"pso"} and stored == 2
     assert {r.solver for r in read_records(tmp_path)} == {"pso", "ga"}
 
 
-def test_a_polished_run_is_of_the_settings_of_its_search(tmp_path: Path) -> None:
-    def polishing(population: int) -> StudySettings:
-        solver = SolverSpec(name="pso", label="swarm", settings={"population": population}, polish=True)
-        return replace(STUDY, solvers=(solver,), runs=1)
+def test_without_a_list_runs_of_one_name_and_other_inputs_are_not_mixed(tmp_path: Path) -> None:
+    grow(tmp_path, replace(STUDY, solvers=(PSO,)))
+    grow(tmp_path, replace(STUDY, solvers=(PSO,), stop=Stop(evaluations=300)))
+    (tmp_path / "study.json").unlink()
+    evidence = read_evidence(tmp_path)
+    assert len(evidence.records) == 2 and len({r.inputs.solver_key for r in evidence.records}) == 1
+    assert all("give the solvers different labels" in sentence for sentence in evidence.sentences)
 
-    grown(tmp_path, polishing(20))
-    _, kept, said = grown(tmp_path, polishing(30))
-    assert kept == 0 and said == [
-        "swarm on walk12: 1 run recomputed: population 20 -> 30",
-        "swarm+ipopt on walk12: 1 run recomputed: the search that it polishes",
-    ]
+
+def test_a_gradient_run_depends_only_on_what_it_heeds() -> None:
+    def find_key(solver: str, **stop: Any) -> str:
+        return Task(problem=STUDY.problems[0], solver=solver, stop=Stop(**stop)).inputs().key
+
+    assert find_key("ipopt", evaluations=300) == find_key("ipopt", evaluations=400, target=0.5)
+    assert find_key("ipopt", time_limit_s=9.0) != find_key("ipopt")
+    assert find_key("slsqp", evaluations=300) != find_key("slsqp", evaluations=400)
 
 
 @pytest.mark.slow
@@ -102,32 +116,41 @@ def test_a_robot_is_its_content_wherever_its_file_lies(
 
     def study(robot: str) -> StudySettings:
         spec = ProblemSpec(name="nao-ssp", options={"robot": robot})
-        return replace(STUDY, problems=(spec,), solvers=STUDY.solvers[:1], runs=1)
+        return replace(STUDY, problems=(spec,), solvers=(PSO,), runs=1)
 
     out, elsewhere = tmp_path / "study", tmp_path / "elsewhere"
     elsewhere.mkdir()
     for folder in (tmp_path, elsewhere):
         (folder / "my.json").write_text(json.dumps(humanoid()))
     monkeypatch.chdir(tmp_path)
-    (first,), kept, said = grown(out, study("my.json"))
-    assert grown(out, study(str(elsewhere / "my.json")))[1:] == (1, [])
+    (first,), _ = grow(out, study("my.json"))
+    assert grow(out, study(str(elsewhere / "my.json")))[1] == 1
     heavier = humanoid()
     heavier["links"]["torso"]["mass_kg"] *= 1.5
     (elsewhere / "my.json").write_text(json.dumps(heavier))
     monkeypatch.chdir(elsewhere)
-    (second,), kept, said = grown(out, study("my.json"))
-    assert kept == 0 and said == ["pso on nao-ssp: 1 run recomputed: the file of robot"]
-    assert second.verdict.objective != first.verdict.objective
+    (second,), stored = grow(out, study("my.json"))
+    assert stored == 0 and second.verdict.objective != first.verdict.objective
     monkeypatch.chdir(tmp_path)
-    assert grown(out, study("my.json"))[1:] == (1, [])
+    assert grow(out, study("my.json"))[1] == 1
 
 
-def test_a_copy_of_a_record_under_a_key_is_refused(tmp_path: Path) -> None:
-    grown(tmp_path, STUDY)
+def test_a_copy_of_a_record_under_another_name_is_refused(tmp_path: Path) -> None:
+    grow(tmp_path, STUDY)
     path = locate_record(tmp_path, STUDY.tasks()[0])
-    path.with_name(f"{path.stem}.00000000.json").write_text(path.read_text())
-    with pytest.raises(InputError, match="belongs to walk12/pso-0000.json"):
+    (tmp_path / "study.json").unlink()
+    path.with_name("pso-0000-00000000.json").write_text(path.read_text())
+    with pytest.raises(InputError, match=f"belongs to walk12/{path.name}; rename or delete it"):
         read_records(tmp_path)
+
+
+def test_the_list_of_runs_has_each_once_in_any_order_of_commands(tmp_path: Path) -> None:
+    for settings in (STUDY, replace(STUDY, solvers=(GA,), runs=3), STUDY):
+        grow(tmp_path, settings)
+    runs = read_manifest(tmp_path).runs
+    assert sorted(name.rpartition("-")[0] for name in runs) == [
+        f"walk12/{solver}-000{run}" for solver in ("ga", "pso") for run in (0, 1)
+    ]
 
 
 def test_an_algorithm_of_a_notebook_has_no_source_to_hash(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -36,7 +36,7 @@ def task(tmp_path: Path) -> Task:
 
 def status(task: Task, say: Callable[[], object] = lambda: "") -> str:
     """Status of the record that comes back from a run that says something."""
-    return try_task(task, run=lambda task, _: RunRecord.make_failed(task, str(say()))).status.removeprefix("failed: ")
+    return try_task(task, run=lambda task: RunRecord.make_failed(task, str(say()))).status.removeprefix("failed: ")
 
 
 def test_a_run_has_its_own_process_and_session_and_no_output(task: Task, capfd: pytest.CaptureFixture[str]) -> None:

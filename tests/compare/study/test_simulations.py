@@ -14,11 +14,10 @@ from typer.testing import CliRunner
 from compare.cli import app
 from compare.study import simulations
 from compare.study.record import RunRecord
-from compare.study.record_files import RECORDS
+from compare.study.record_files import write_records
 from compare.study.simulations import load_simulations, simulate_records
 from compare.study.store import Store
 from nlp_gait.errors import InputError
-from nlp_gait.files import write_json
 from nlp_gait.formulation import Display
 from nlp_gait.simulation.drive import DRIVES, Drive
 from tests.compare.records import FAST_X, judged
@@ -35,9 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A study of two solvers with a gait each."""
     pytest.importorskip("mujoco")
     path = tmp_path_factory.mktemp("study")
-    (path / RECORDS / "nao-dsp").mkdir(parents=True)
-    for made in (dsp("pso"), dsp("ga", 0.51, solve_s=0.6)):
-        write_json(path / RECORDS / "nao-dsp" / f"{made.solver}-0000.json", made.to_json())
+    write_records([dsp("pso"), dsp("ga", 0.51, solve_s=0.6)], path)
     return path
 
 
@@ -102,23 +99,21 @@ def test_problems_that_cannot_be_simulated_are_left_out_or_refused(
     still = SimpleNamespace(problem=SimpleNamespace(display=Display()))
     monkeypatch.setattr(simulations, "load_gait", lambda _: still)
     assert simulate_records(tmp_path, [dsp("pso")], Drive()) == []
-    (tmp_path / RECORDS / "nao-dsp").mkdir(parents=True)
-    write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso").to_json())
+    write_records([dsp("pso")], tmp_path)
     refused = CliRunner().invoke(app, ["report", str(tmp_path), "--engine"])
     assert refused.exit_code == 1 and "no gait of nao-dsp can be simulated" in refused.stderr
 
 
 def test_a_damaged_simulation_is_refused_with_its_remedy(tmp_path: Path) -> None:
     gait = dsp("pso")
-    inputs = {"problem": gait.definition["problem"], "x": dict(gait.x), "drive": asdict(Drive())}
+    inputs = {"problem": gait.inputs.problem, "x": dict(gait.x), "drive": asdict(Drive())}
     Store(tmp_path).save("simulations/nao-dsp/pso-0", inputs, {})
     with pytest.raises(InputError, match="delete it and rerun with --engine"):
         load_simulations(tmp_path, [dsp("pso")])
 
 
 def test_a_report_without_simulations_says_how_to_get_them(tmp_path: Path) -> None:
-    (tmp_path / RECORDS / "nao-dsp").mkdir(parents=True)
-    write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso").to_json())
+    write_records([dsp("pso")], tmp_path)
     done = CliRunner().invoke(app, ["report", str(tmp_path)])
     assert done.exit_code == 0
     assert "`nlp-gait report DIR --engine`" in (tmp_path / "report.md").read_text()

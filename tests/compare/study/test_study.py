@@ -22,7 +22,7 @@ from compare.study.record import read_record
 from compare.study.record_files import locate_record, read_records
 from compare.study.run_study import Study, run_study
 from compare.study.run_task import try_task
-from compare.study.settings import SolverSpec, StudySettings, parse_settings, read_settings
+from compare.study.settings import SolverSpec, StudySettings, parse_settings, read_manifest, read_settings
 from compare.study.task import Handling, ProblemSpec, Stop, Task
 from metaheuristics import ParticleSwarm, SearchError
 from metaheuristics.interface import Array, Start
@@ -59,11 +59,11 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_one_file_a_run(undisturbed: Path) -> None:
-    names = [
-        f"records/walk12/{solver}-000{run}.json" for solver in ("ga", "pso", "pso+ipopt", "pso-20") for run in (0, 1)
-    ]
-    assert sorted(contents(undisturbed)) == sorted(names)
+def test_each_run_has_one_file_named_after_its_inputs(undisturbed: Path) -> None:
+    names = [f"walk12/{solver}-000{run}" for solver in ("ga", "pso", "pso+ipopt", "pso-20") for run in (0, 1)]
+    runs = read_manifest(undisturbed).runs
+    assert sorted(contents(undisturbed)) == sorted(f"records/{name}.json" for name in runs)
+    assert sorted(name.rpartition("-")[0] for name in runs) == sorted(names)
 
 
 @pytest.mark.slow
@@ -73,9 +73,8 @@ def test_many_workers_give_the_same_files(undisturbed: Path, tmp_path: Path) -> 
 
 
 def test_a_polished_run_carries_the_search_before_it(undisturbed: Path) -> None:
-    search, polished = (
-        read_record(undisturbed / "records" / "walk12" / f"{name}-0001.json") for name in ("pso", "pso+ipopt")
-    )
+    records = {record.solver: record for record in read_records(undisturbed) if record.run == 1}
+    search, polished = records["pso"], records["pso+ipopt"]
     assert polished.verdict.feasible and polished.verdict.objective == pytest.approx(0.970839, rel=1e-5)
     assert polished.verdict.objective > search.verdict.objective  # maximised
     assert polished.evaluations["f"] > search.evaluations["f"] == 500 and polished.evaluations["jacobian"] > 0
@@ -98,8 +97,8 @@ def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
     good = locate_record(undisturbed, task).read_text()
     for text, message in (
         (good[: len(good) // 2], "is not valid JSON"),
-        ("[]", "'schema' must be 4, got 'list'"),
-        (good.replace('"schema": 4', '"schema": 1'), "'schema' must be 4, got 1"),
+        ("[]", "'schema' must be 5, got 'list'"),
+        (good.replace('"schema": 5', '"schema": 1'), "'schema' must be 5, got 1"),
         (good.replace('"history": {', '"history": 3, "other": {'), "damaged"),
     ):
         path.write_text(text)
@@ -161,9 +160,13 @@ def test_a_run_that_raises_is_a_record_with_the_reason(tmp_path: Path) -> None:
 
 
 def test_polishing_a_failed_run_is_a_failure_too(tmp_path: Path) -> None:
-    failed = try_task(Task(problem=SSP, solver=Broken()))
-    polished = try_task(Task(problem=SSP, solver="ipopt", label="broken+ipopt", polishes="broken"), failed)
-    assert "has no point to polish: failed: RuntimeError" in polished.status
+    (tmp_path / "own.py").write_text("def search(f, lower, upper, evaluations, seed): raise RuntimeError('no luck')\n")
+    for solver, reason in (
+        (Broken(), "RuntimeError: no <luck>"),
+        (f"{tmp_path}/own.py:search", "has no point to polish"),
+    ):
+        polished = try_task(Task(problem=SSP, solver=solver, polish=True))
+        assert reason in polished.status and not polished.x and polished.inputs.polish
 
 
 @pytest.mark.slow
@@ -284,18 +287,15 @@ def test_leftovers_of_a_killed_process_go(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {new.name, record.name, *others}
 
 
-@pytest.mark.slow
-def test_an_interrupt_that_a_solver_swallows_ends_the_study_without_a_record(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def swallowing(*job: Any) -> Any:
-        try:
-            signal.raise_signal(signal.SIGINT)
-        except KeyboardInterrupt:
-            return try_task(*job)
+def swallow(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
+    with suppress(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+    f(lower[None])
 
+
+@pytest.mark.slow
+def test_an_interrupt_that_a_solver_swallows_ends_the_study_without_a_record(tmp_path: Path) -> None:
     before = signal.getsignal(signal.SIGINT)
-    monkeypatch.setattr(compare.study.run_study, "try_task", swallowing)
     with pytest.raises(KeyboardInterrupt):
-        run_study(Study(tasks=(Task(problem=SSP, solver="pso", stop=Stop(evaluations=100)),), folder=tmp_path))
-    assert not list(tmp_path.rglob("*.json")) and signal.getsignal(signal.SIGINT) is before
+        run_study(Study(tasks=(Task(problem=SSP, solver=swallow, stop=Stop(evaluations=100)),), folder=tmp_path))
+    assert not list(tmp_path.rglob("records/*/*.json")) and signal.getsignal(signal.SIGINT) is before
