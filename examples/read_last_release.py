@@ -24,10 +24,11 @@ def convert(old: dict[str, Any]) -> RunRecord:
     spec = ProblemSpec(name=problem["name"], options=problem["options"], values=problem["parameters"])
     inputs["problem"] = identify_problem(spec.load())
     inputs["code"] = origin.pop("code_sha256") if origin else ""
-    inputs["stop"] = {key: value for key, value in (inputs.get("stop") or {}).items() if value is not None}
     inputs["imported"] = (inputs.get("imported") or {}).get("sha256", "")
     if polishes := inputs.pop("polishes", None):
-        inputs |= {"polish": True, "solver": polishes["solver"], "handling": polishes["handling"]}
+        inputs |= {**polishes, "polish": True}
+        inputs.pop("key", None)
+    inputs["stop"] = {key: value for key, value in inputs.get("stop", {}).items() if value is not None}
     del old["seed"]
     return parse_record({**old, "inputs": inputs, "schema": SCHEMA})
 

@@ -66,7 +66,7 @@ def report(
 ) -> Output:
     """Rewrite a study's report from all records of its folder, without running a solver.
 
-    It includes solvers that a later call omitted; runs of earlier definitions have names that say how they differ. Every point is
+    It has the runs that `study.json` lists: of each problem and solver those of the latest command that ran it. Every point is
     evaluated again. Records whose numbers do not follow from it, or that contradict a proof, are excluded; then the exit status
     is 1.
 
