@@ -22,8 +22,6 @@ from compare.analysis.units import format_percent, with_unit
 from compare.study.record import RunRecord
 from compare.study.references import BETTER, Reference, find_reference
 from compare.study.task import GRADIENT_SOLVERS, SOURCE
-from nlp_gait.backends.identity import hash_json
-from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Objective
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE

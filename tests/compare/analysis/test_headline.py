@@ -95,7 +95,7 @@ def test_the_users_solver_is_the_subject_with_those_that_it_differs_from() -> No
         for run in range(12):
             made = record(solver, run, [(10, value + 2e-3 * run * (solver != "ipopt"))])
             code = {"solver": {"name": "my.py:mine", "source_sha256": "0" * 64}} if solver == "mine" else {}
-            records.append(replace(made, definition={**made.definition, **code}))
+            records.append(replace(made, inputs=replace(made.inputs, **code)))
     assert write_headline(compare_problems(records)[0]) == (
         "On walk mine ends 0.31 % above the best power (median of 12 runs, behind ipopt, before pso), which is 10.000000 W, the "
         "best of this study; none is shipped for this problem. Median runs end above it by near 0.32 %, pso 5.1 % (mine before "
