@@ -115,7 +115,7 @@ def use_log_axes(axes: Axes, both: bool = False) -> None:
 
     Powers of ten are plain text: parsing mathematics takes most of a figure's time.
     """
-    from matplotlib.ticker import FuncFormatter, NullFormatter
+    from matplotlib.ticker import FuncFormatter, NullLocator
 
     drawn = axes.dataLim  # its least positive values are infinite where nothing positive was drawn
     for axis, positive in ((axes.xaxis, drawn.minposx), (axes.yaxis, drawn.minposy if both else math.inf)):
@@ -125,7 +125,7 @@ def use_log_axes(axes: Axes, both: bool = False) -> None:
                 axes.set(**{f"{name}lim": (positive / 10.0, positive * 10.0)})
             axes.set(**{f"{name}scale": "log"})
             axis.set_major_formatter(FuncFormatter(lambda value, _: format_power_of_ten(value)))
-            axis.set_minor_formatter(NullFormatter())
+            axis.set_minor_locator(NullLocator())
 
 
 def format_power_of_ten(value: float) -> str:

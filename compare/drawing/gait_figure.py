@@ -84,7 +84,7 @@ def plot_gaits(gaits: Mapping[str, GaitCurves], *, curves: bool = True) -> Figur
     columns = 2 if len(gaits) > 1 and count > 2 else count
     rows = -(-count // columns)
     with use_style():
-        figure = make_figure(WIDTH_IN, ROW_IN * rows)
+        figure = make_figure(WIDTH_IN, ROW_IN * rows) if charts else make_figure(WIDTH_IN / 2, 1.5 * ROW_IN)
         axes = list(figure.subplots(rows, columns, squeeze=False).flat)
         if first.skeleton is not None:
             _draw_poses(axes[0], first.skeleton, name)
