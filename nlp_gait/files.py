@@ -29,6 +29,7 @@ LARGEST_FILE = 64 * 2**20  # bytes; a record has about 10 kB, a result with thou
 DEEPEST = 32  # levels of objects and lists; files of this package have six
 LARGEST_INTEGER = 2**63 - 1
 SHOWN = 60  # characters of a value in a message
+EXAMINED = 4096  # bytes at each end of a file that is to be replaced
 BYTE_ORDER_MARK = "\ufeff"
 # Writing takes far less, so an older temporary file belongs to no running process.
 LEFTOVER_AGE_S = 60.0
@@ -213,13 +214,25 @@ def protect_input(path: Path) -> None:
         _inputs.update((_find_place(path), path.resolve()))
 
 
-def is_forced() -> bool:
-    """Return whether this command may replace any file."""
-    return _forced
+def check_output(path: Path, written_content: bytes | None) -> None:
+    """Check, before the work, that a file can be written and, if it exists, replaced; raises OutputError.
+
+    Unless this command may replace any file, it must contain what this package writes: a pattern for its first or last bytes.
+    """
+    check_path(str(path), f"cannot write to {str(path)!r}", OutputError)
+    _check_no_input(path)
+    make_writable_folder(path.parent)
+    with convert_errors(f"cannot write {str(path)!r}", OutputError):
+        if path.is_dir():
+            raise ValueError("it is a folder; name a file")
+        if path.is_file() and not _forced:
+            content = path.read_bytes()
+            ends = content[:EXAMINED] + content[-EXAMINED:]
+            if written_content is None or not re.search(written_content, ends, re.DOTALL):
+                raise ValueError("it exists, and nlp-gait did not write it; name another file, or give --force")
 
 
-def check_output(path: Path) -> None:
-    """Check that a path is no input of this command; raises OutputError."""
+def _check_no_input(path: Path) -> None:
     if _inputs and _find_place(path) in _inputs:
         raise OutputError(f"cannot write {str(path)!r}: this command reads it; name another file, or give --force")
 
@@ -235,15 +248,14 @@ def replace_file(path: Path) -> Iterator[Path]:
 
     A power cut leaves either the complete new file or the old state.
     """
-    check_output(path)
+    _check_no_input(path)
     temporary = None
     try:
         with convert_errors(f"cannot write {str(path)!r}", OutputError):
             if path.exists() and not path.is_file():  # a device or a pipe would be replaced, not written to
                 raise OSError("it is a folder" if path.is_dir() else "it is not a regular file")
             unused = path.parent / f".{secrets.token_hex(8)}.tmp"
-            # O_EXCL: it is not an existing file or link of another user.
-            os.close(os.open(unused, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+            unused.touch(exist_ok=False)  # it is not an existing file or link of another user
             temporary = unused
             yield temporary
             flush(temporary)

@@ -21,11 +21,23 @@ import typer
 
 from compare.cli.printing import Output, fail, print_output, say_error
 from nlp_gait.errors import GaitError
-from nlp_gait.files import protect_inputs
+from nlp_gait.files import check_output, protect_inputs
 from nlp_gait.interrupts import raise_interrupts
 
-# In the annotation of a parameter that names the folder, or the file, that the command writes.
-OUTPUT, OUTPUT_FILE = "output", "output file"
+# In the annotation of a parameter that names the folder, the file, or either, that the command writes.
+OUTPUT, OUTPUT_FILE, OUTPUT_OF_ANY_KIND = "output", "output file", "output of any kind"
+# What is in the first or last bytes of a file that a command wrote, by suffix.
+WRITTEN_CONTENT = {
+    ".json": rb'\A\{\n "(schema": \d+,\n "(problem|kind|robot)|names": \[|header": \{\n  "frame_id)',
+    ".csv": rb"\At_s,|\A[^\n]*,violation,feasible,feasible_between_samples,guaranteed",
+    ".motion": rb"\A#WEBOTS_MOTION,V1\.0,",
+    ".xml": rb'\A<mujoco model="[^"]*">\n  <compiler angle="radian" autolimits="true" />\n  <option integrator="implicitfast"',
+    ".npz": rb"joints\.npy",
+    ".zip": rb"manifest\.json",
+    ".html": rb'<meta name="generator" content="nlp-gait">',
+    ".gif": rb"\AGIF89a.*nlp-gait",
+    ".png": rb"\A\x89PNG.*Matplotlib",
+}
 SESSION = "session"  # of one that decides how and where a study runs, not what it computes
 CONTINUE = "rerun the command to continue"
 
@@ -45,6 +57,11 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
     """Make a function a Typer command: groups become options, and its output is printed; expected errors are one sentence."""
     from metaheuristics.errors import SearchError  # imports NumPy, which the list of commands does without
 
+    options = [*_list_options(function), JSON]
+    files = [option.name for option in options if OUTPUT_FILE in get_marks(option)]
+    outputs = {option.name for option in options if get_marks(option) & {OUTPUT, OUTPUT_FILE, OUTPUT_OF_ANY_KIND}}
+    if any(get_marks(option) & {OUTPUT_FILE, OUTPUT_OF_ANY_KIND} for option in options):
+        options.append(FORCE)
     parameters = inspect.signature(function, eval_str=True).parameters.values()
     groups: dict[str, Any] = {p.name: p.annotation for p in parameters if is_dataclass(p.annotation)}
 
@@ -54,6 +71,9 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
         try:
             with raise_interrupts():
                 protect_inputs(_find_inputs(given, outputs), given.pop("force", False))
+                for name in files:
+                    if given[name] is not None:
+                        check_output_file(given[name])
                 for name, group in groups.items():
                     given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
                 output = function(**given)
@@ -73,13 +93,15 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
             _report_os_error(error)
             raise typer.Exit(1) from None
 
-    options = [*_list_options(function), JSON]
-    outputs = {option.name for option in options if get_marks(option) & {OUTPUT, OUTPUT_FILE}}
-    if any(OUTPUT_FILE in get_marks(option) for option in options):
-        options.append(FORCE)
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
     return run
+
+
+def check_output_file(path: Path) -> Path:
+    """Return a path after ``check_output``: a file that no command wrote is not replaced, unless with --force."""
+    check_output(path, WRITTEN_CONTENT.get(path.suffix.lower()))
+    return path
 
 
 @contextmanager

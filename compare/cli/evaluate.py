@@ -13,7 +13,6 @@ from typer import Option
 from compare.analysis.units import make_heading, with_unit
 from compare.cli.command import OUTPUT_FILE, command
 from compare.cli.options import AnyProblem, parse_number, parse_numbers, parse_options, parse_pairs
-from compare.cli.outputs import check_output_file
 from compare.cli.printing import Output, Rows, fail, tabulate
 from compare.judge import Evaluation
 from compare.judge import evaluate as judge
@@ -79,7 +78,7 @@ def evaluate(
         fail("--signals takes one candidate; give it as numbers")
     if signals is not None and loaded.display.motion is None:
         fail(f"problem {problem.name!r} has no signals")
-    written = [check_output_file(path) for path in (signals, table) if path is not None]
+    written = [path for path in (signals, table) if path is not None]
     points = read_points(Path(x), loaded, FINALS)[1] if many else [loaded.check_x(parse_numbers("x", x, "--x"))]
     judged = [judge(loaded, point) for point in points]
     if signals is not None:
@@ -129,10 +128,10 @@ def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) 
 def _evaluate_motion(gait: RecordedGait, engine: bool, signals: Path | None) -> Output:
     from compare.questions.recorded import judge_gait
 
-    written = [] if signals is None else [check_output_file(signals)]
     judged = judge_gait(gait, in_engine=engine)
     if signals is not None:
         write_npz(signals, gait.problem.signals(gait.x))
+    written = [] if signals is None else [signals]
     return Output(data=judged.to_json(), parts=[*_describe_gait(judged)], written=written)
 
 

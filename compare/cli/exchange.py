@@ -9,7 +9,6 @@ from compare.archive import pack_study, verify_archive, verify_folder
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
 from compare.cli.compare import describe_summaries, list_excluded, summarise_problems
 from compare.cli.options import RESULTS, Code, NamedProblem, name_all, parse_number
-from compare.cli.outputs import check_output_file
 from compare.cli.printing import Output, show_progress
 from compare.report import write_report
 from compare.study.evidence import read_evidence
@@ -75,7 +74,7 @@ def verify(
         raise InputError(f"--rerun takes a share from 0% to 100%, got {rerun!r}")
     name_all(code)
     if pack is not None:
-        return _pack(study, check_output_file(pack))
+        return _pack(study, pack)
     with show_progress("repeated runs", None) as advance:
         check = verify_folder if study.is_dir() else verify_archive
         findings = check(study, share=share, progress=advance).findings

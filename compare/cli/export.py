@@ -7,9 +7,8 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from compare.cli.command import OUTPUT_FILE, command, report_interrupts
+from compare.cli.command import OUTPUT_OF_ANY_KIND, check_output_file, command, report_interrupts
 from compare.cli.options import Code, Limits, ProblemOptions, Values, name_all
-from compare.cli.outputs import check_output_file
 from compare.cli.printing import Output
 from compare.study.record import load_result_or_record
 from compare.study.references import find_reference
@@ -39,7 +38,7 @@ def export(
     source: Annotated[str, Argument(metavar="RESULT.json|PROBLEM", help=SOURCE)],
     *,
     to: Annotated[str, Option(metavar="KIND", help=KIND)],
-    out: Annotated[Path | None, Option(help=OUT), OUTPUT_FILE] = None,
+    out: Annotated[Path | None, Option(help=OUT), OUTPUT_OF_ANY_KIND] = None,
     period_ms: Annotated[int, Option(min=1, max=86400000, help="Time between rows [ms].")] = PERIOD_MS,
     values: Values = None,
     limits: Limits = None,

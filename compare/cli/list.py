@@ -9,7 +9,6 @@ from typing import Annotated, Any
 from typer import Argument, Option
 
 from compare.cli.command import OUTPUT_FILE, command
-from compare.cli.outputs import check_output_file
 from compare.cli.printing import Output, Rows, tabulate
 from compare.study.citations import find_citations
 from compare.study.description import Description, describe_solver, list_described_names
@@ -51,7 +50,7 @@ def list_problems(
         entries = find_citations(name)
         return Output(data={"entries": entries}, parts=["\n\n".join(entries)])
     if robot is not None and name is None:
-        return _describe_robot(robot, None if out is None else check_output_file(out))
+        return _describe_robot(robot, out)
     if out is not None:
         raise InputError("--out is the figure of a robot; give --robot FILE, and no problem")
     if name is None:

@@ -14,7 +14,6 @@ from typer import Option
 from compare.analysis.units import format_millimetres, with_unit
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
 from compare.cli.options import StoredGait, parse_numbers
-from compare.cli.outputs import check_output_file
 from compare.cli.printing import Output, Rows, show_progress
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
@@ -131,21 +130,21 @@ def simulate(
     from nlp_gait.simulation.simulate import SETTLE_TIME, measure_robustness, prepare, simulate_plan
 
     load_mujoco(pictures=video is not None)
-    film = None if video is None else check_output_file(check_video_path(video))
-    target = None if page is None else check_output_file(page)
+    if video is not None:
+        check_video_path(video)
     folder = None if out is None else make_writable_folder(out)
     drive, conditions, result = drive_options.make(), world.make(), stored.load()
     plan = make_plan(result, steps)
-    if film is not None:
+    if video is not None:
         check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
     trace = simulate_plan(plan, conditions, drive, sole)
-    written = [path for path in (target, film) if path is not None]
+    written = [path for path in (page, video) if path is not None]
     model, _ = prepare(plan, conditions, drive, sole)
-    if target is not None:
+    if page is not None:
         power = np.abs(trace.torque * trace.qd).sum(axis=1)[list_frames(trace)]
-        animate_simulation(make_skeleton(plan, trace, model, sole, result.problem.title), power).write(target)
-    if film is not None:
-        write_video(film, _show_pictures(draw_pictures(plan, trace, model), len(list_frames(trace))), FRAMES_PER_S)
+        animate_simulation(make_skeleton(plan, trace, model, sole, result.problem.title), power).write(page)
+    if video is not None:
+        write_video(video, _show_pictures(draw_pictures(plan, trace, model), len(list_frames(trace))), FRAMES_PER_S)
     walk = None if plan.steps is None else measure_walk(plan, trace, drive, plan.steps)
     report = measure(plan, trace, drive) if walk is None else walk.measurements
     data = {"schema": 1, **asdict(report)}

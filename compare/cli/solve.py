@@ -12,7 +12,6 @@ from compare.analysis.best_known import describe_value
 from compare.analysis.units import with_unit
 from compare.cli import options
 from compare.cli.command import OUTPUT_FILE, command, report_interrupts
-from compare.cli.outputs import check_output_file
 from compare.cli.printing import Output, Rows, fail, say, show_progress, tabulate
 from compare.study.references import find_reference
 from nlp_gait.backends.identity import identify_problem
@@ -50,7 +49,6 @@ def solve(
 
     Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --set swing_height_m=0.024`
     """
-    target = None if out is None else check_output_file(out)
     loaded = problem.load()
     first = None if x0 is None else loaded.check_x(options.parse_numbers("x", x0, "--x0"))
     chosen = registry.make_solver(solver, **({} if linear_solver is None else {"linear_solver": linear_solver}))
@@ -80,14 +78,14 @@ def solve(
     if proven is not None:
         parts += [f"Guaranteed: {proven}", describe_value(known, solution.objective, loaded.objective)]
     written, failures = [], [] if solution.converged else [solution.status]
-    if target is not None:
+    if out is not None:
         try:
-            write_json(target, replace_nan(data))
-            written.append(target)
+            write_json(out, replace_nan(data))
+            written.append(out)
         except OutputError as error:  # the solution is printed nevertheless
             failures = [str(error)]
     if stopped:
-        where = f"in {target}" if written else "printed"
+        where = f"in {out}" if written else "printed"
         return Output(
             data=data, parts=parts, written=written, interrupted=f"{stopped}; the best point so far is {where}"
         )
@@ -148,7 +146,6 @@ def plan(
     Examples: `nlp-gait plan --robot nao-v5 --steps 10 --speed 0.05 --out walk.json`, then `nlp-gait simulate walk.json` and
     `nlp-gait export walk.json --to csv --period-ms 1`
     """
-    target = None if out is None else check_output_file(out)
     given = dict(options.parse_pairs(values, "--set"))
     pairs = [("intervals", given.pop("intervals", "10")), ("limits", ",".join(limits or ()))]
     numbers = {name: options.parse_number(name, text, "--set") for name, text in given.items()}
@@ -174,8 +171,8 @@ def plan(
         walk = nlp_gait.plan_walk(
             robot, steps, speed_m_s=speed, distance_m=distance, slope_deg=slope_deg, settings=settings
         )
-    if target is not None:
-        walk.save(target)
+    if out is not None:
+        walk.save(out)
     step = walk.solution.x.get("step_length_m")
     return Output(
         data=walk.to_json(),
@@ -183,6 +180,6 @@ def plan(
             f"{walk.steps} steps, {walk.distance_m:.3f} m in {walk.duration_s:.2f} s: {walk.energy_J:.2f} J, "
             f"{walk.energy_J / walk.distance_m:.2f} J/m" + ("" if step is None else f"; steps of {step:.4f} m")
         ],
-        written=[] if target is None else [target],
+        written=[] if out is None else [out],
         failures=[] if walk.feasible else ["no feasible walk was found. " + ". ".join(walk.obstacles)],
     )

@@ -4,11 +4,9 @@ from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path
 
-from nlp_gait.errors import OutputError
-from nlp_gait.files import is_forced, make_writable_folder, write_text
+from nlp_gait.files import check_output, make_writable_folder, write_text
 
 MARK = b"nlp-gait"  # in the first lines of every file that is written
-LARGEST_MARKED = 4096  # bytes
 
 
 def write_c_files(
@@ -35,18 +33,10 @@ def write_c_files(
         texts[name.format(prefix=prefix)] = text
     paths = {make_writable_folder(folder) / name: text for name, text in texts.items()}
     for path in paths:
-        check_own_file(path)
+        check_output(path, MARK)
     for path, text in paths.items():
         write_text(path, text)
     return list(paths)
-
-
-def check_own_file(path: Path) -> None:
-    """Raise OutputError if there is a file that this package did not write, unless --force is given."""
-    if path.is_file() and MARK not in path.read_bytes()[:LARGEST_MARKED] and not is_forced():
-        raise OutputError(
-            f"cannot write {str(path)!r}: nlp-gait did not write this file; name another folder, or give --force"
-        )
 
 
 def format_comment(lines: Iterable[str]) -> str:

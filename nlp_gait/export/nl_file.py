@@ -11,8 +11,8 @@ import numpy as np
 
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.errors import InputError
-from nlp_gait.export.c_files import check_own_file
-from nlp_gait.files import make_writable_folder, write_json, write_text
+from nlp_gait.export.c_files import MARK
+from nlp_gait.files import check_output, make_writable_folder, write_json, write_text
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.symbolic.tape import Instruction, read_tape
@@ -53,7 +53,7 @@ def export_nl(problem: GaitProblem, folder: Path, best_known: Mapping[str, Any])
         "row": "\n".join([*rows, problem.objective.name, ""]),
     }
     paths = {ending: make_writable_folder(folder) / f"{prefix}.{ending}" for ending in (*texts, "facts.json")}
-    check_own_file(paths["nl"])
+    check_output(paths["nl"], MARK)
     for ending, text in texts.items():
         write_text(paths[ending], text)
     facts = {"problem": problem.address, "options": dict(problem.options), "parameters": dict(problem.values)}

@@ -74,7 +74,7 @@ def test_another_reader_and_ipopt_find_the_optimum(tmp_path: Path) -> None:
     assert len(names) == len(found.x) and paths[".row"].read_text().split()[-1] == "cost"
     assert len(paths[".row"].read_text().split()) == len(found.g) + 1
     paths[".nl"].write_text("g3 of another program")
-    with pytest.raises(OutputError, match="nlp-gait did not write this file"):
+    with pytest.raises(OutputError, match="nlp-gait did not write it"):
         export_nl(toy(corner), tmp_path, {})
 
 

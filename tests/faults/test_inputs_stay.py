@@ -117,6 +117,6 @@ def test_an_exported_folder_keeps_files_of_others(tmp_path: Path) -> None:
         folder = tmp_path / str(k)
         folder.mkdir()
         (folder / name).write_text("#include <stdio.h>\nint main(void) { return 0; }\n")
-        with pytest.raises(OutputError, match="did not write this file"):
+        with pytest.raises(OutputError, match="did not write it"):
             export_objective(instance, folder)
         assert [path.name for path in folder.iterdir()] == [name]
