@@ -22,9 +22,9 @@ class HipPitchRate(Limit):
     # name, unit, default, description, smallest and largest value
     parameters = make_parameters(("hip_pitch_rate_limit_rad_s", "rad/s", 3.0, "largest rate of hip pitch", 0.0, 100.0))
 
-    def add(self, at, samples, ops):
+    def add(self, point, samples, ops):
         """Return the rows, and performance indexes by name."""
-        limit = at["hip_pitch_rate_limit_rad_s"]
+        limit = point["hip_pitch_rate_limit_rad_s"]
         rates = samples.qd[[samples.moving.index(joint) for joint in HIPS], :]
         return [make_rows_at_samples("hip_pitch_rate", "rad/s", rates, HIPS, -limit, limit)], {}
 

@@ -22,7 +22,7 @@ from nlp_gait.gaits.biped.body import TIMED_UNITS, Body
 from nlp_gait.gaits.biped.cycle_motion import STEP
 from nlp_gait.gaits.biped.footholds import list_arc, list_swings, parse_footholds, read_footholds
 from nlp_gait.gaits.biped.footstep_walk import name_speed
-from nlp_gait.gaits.biped.walk_parts import GREATEST_SPEED, HALF_STEPS, LEAST_SPEED, start_from_cycle
+from nlp_gait.gaits.biped.walk_sections import GREATEST_SPEED, HALF_STEPS, LEAST_SPEED, start_from_cycle
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.gaits.humanoid.turning import list_turn
 from nlp_gait.gaits.nao.body import load_nao, make_nao

@@ -22,7 +22,7 @@ from nlp_gait.gaits.biped.footholds import (
     parse_footholds,
     read_footholds,
 )
-from nlp_gait.gaits.biped.walk_parts import start_from_cycle
+from nlp_gait.gaits.biped.walk_sections import start_from_cycle
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.gaits.humanoid.turning import find_sharpest_turn, find_stiff_joint, list_turn
 from nlp_gait.gaits.nao.body import make_nao

@@ -54,9 +54,9 @@ STEEPEST_DEG = 30.0  # slope of the ground
 TIMED_UNITS = ("s", "m/s", "rad/s")  # of variables whose bounds are this package's, not the robot's
 
 
-def read_duration(at: InstantPoint, phase: Support) -> SX:
+def read_duration(point: InstantPoint, phase: Support) -> SX:
     """Return the duration of a phase [s], never zero."""
-    return ca.fmax(at[TIMES[phase]], LEAST_DURATION)
+    return ca.fmax(point[TIMES[phase]], LEAST_DURATION)
 
 
 # Angles that are planned besides the hip, by name [rad]: of swinging arms, or of a leaning torso; in a turn also the yaw of the
@@ -195,15 +195,15 @@ class Body(ABC):
         """Return the names of the angles that a phase plans besides the hip."""
 
     @abstractmethod
-    def angle_ends(self, phase: Support, at: InstantPoint) -> Mapping[str, tuple[SX, SX]]:
+    def angle_ends(self, phase: Support, point: InstantPoint) -> Mapping[str, tuple[SX, SX]]:
         """Return these angles at the start and the end of a phase [rad]."""
 
-    def angles(self, phase: Support, at: InstantPoint, splines: Angles, duration: SX, s: SX) -> Angles:
+    def angles(self, phase: Support, point: InstantPoint, splines: Angles, duration: SX, s: SX) -> Angles:
         """Return the motion of these angles: cubics from rest to rest, and what ``splines`` add."""
         still = SX(0)
         return {
             name: add_motions(cubic(start, end, still, still, duration, s), splines[name])
-            for name, (start, end) in self.angle_ends(phase, at).items()
+            for name, (start, end) in self.angle_ends(phase, point).items()
         }
 
     @abstractmethod
@@ -222,7 +222,7 @@ class Body(ABC):
         """Return the balance margins on the left sole, whose ankle is at ``support_xy`` [m]: distances to the nearer edges."""
         foot = self.robot.feet["left"]
         sole = Box(back=-foot.back_m, front=foot.front_m, right=-foot.right_m, left=foot.left_m)
-        return lambda zmp, at, ops: compute_margins(sole, zmp - ca.repmat(DM(support_xy), 1, zmp.shape[1]), ops)
+        return lambda zmp, point, ops: compute_margins(sole, zmp - ca.repmat(DM(support_xy), 1, zmp.shape[1]), ops)
 
     def make_curve_limits(self, phase: Support, count: int) -> tuple[Limit, ...]:
         """Return the limits that cubics cannot break but splines of ``count`` coefficients can; none without splines."""

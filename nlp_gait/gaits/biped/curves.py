@@ -57,11 +57,11 @@ class Splines:
         )
         return make_variables(*rows)
 
-    def motions(self, at: InstantPoint, duration: SX, phase: SX) -> dict[str, Motion]:
+    def motions(self, point: InstantPoint, duration: SX, phase: SX) -> dict[str, Motion]:
         """Return what each curve adds to its cubic."""
-        coefficients = ca.vertcat(*(at[variable.name] for variable in self.variables))
+        coefficients = ca.vertcat(*(point[variable.name] for variable in self.variables))
         added = spline(ca.reshape(coefficients, self.count, len(self.units)), duration, phase)
-        return {curve: Motion(*(part[i] for part in added)) for i, curve in enumerate(self.units)}
+        return {curve: Motion(*(order[i] for order in added)) for i, curve in enumerate(self.units)}
 
     def start_of(self, names: Sequence[str]) -> Start | None:
         """Return start points with coefficients near zero and the other variables within their bounds; None without splines."""
@@ -79,7 +79,7 @@ class Splines:
 
 
 def move_hip(
-    at: InstantPoint,
+    point: InstantPoint,
     curves: Mapping[str, Motion],
     along: tuple[float, float],
     across: tuple[float, float],
@@ -93,10 +93,10 @@ def move_hip(
     Source:
         Gupta, Pratihar, Deb (2023), Table 3, rows 3 to 5, and Table 5, rows 1 to 3.
     """
-    height = at["hip_height_m"]
+    height = point["hip_height_m"]
     ends = {"x": (SX(along[0]), SX(along[1])), "y": (SX(across[0]), SX(across[1])), "z": (height, height)}
     paper = (
-        cubic(start, end, at[f"hip_v{axis}_start_m_s"], at[f"hip_v{axis}_end_m_s"], duration, phase)
+        cubic(start, end, point[f"hip_v{axis}_start_m_s"], point[f"hip_v{axis}_end_m_s"], duration, phase)
         for axis, (start, end) in ends.items()
     )
     return add_motions(stack(*paper), stack(*(curves[curve] for curve in HIP_CURVES)))

@@ -31,7 +31,7 @@ from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
 from nlp_gait.gaits.biped.samples import Loader, Planner
-from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, TORQUE_JUMP, Part, Sequence, Switch
+from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, TORQUE_JUMP, Section, Sequence, Switch
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -50,7 +50,7 @@ Landing = Literal["soft", "inelastic"]  # of the swinging foot: at rest, or an i
 class WalkingCycle(Sequence):
     """A cycle sampled over both phases; of the variables, the step length is the last one."""
 
-    parts: tuple[Part, ...] = CYCLE
+    sections: tuple[Section, ...] = CYCLE
     touch_down: Switch = Switch(name="touch_down")
     at_given_speed: bool  # the step length is no decision variable but follows from the speed
 
@@ -79,11 +79,11 @@ class WalkingCycle(Sequence):
         )
         return (*(speed if self.at_given_speed else ()), *balance, *limit, *shared)
 
-    def read_part(self, part: Part, at: Any) -> Any:
+    def read_section(self, section: Section, point: Any) -> Any:
         """Return the point with the step length as a variable, also if it follows from the speed."""
         if not self.at_given_speed:
-            return at
-        return at.extend(STEP, at[SPEED] * (at[TIMES[Support.SINGLE]] + at[TIMES[Support.DOUBLE]]))
+            return point
+        return point.extend(STEP, point[SPEED] * (point[TIMES[Support.SINGLE]] + point[TIMES[Support.DOUBLE]]))
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
         """Return objective, rows and indexes.
@@ -92,35 +92,44 @@ class WalkingCycle(Sequence):
         which is off by default: the published one is for a change over an interval of time, while at a switch the
         supporting feet change at once and in this model the loads with them.
         """
-        at = self.read_part(self.parts[0], point)
-        parts = self.assemble_parts(point, ops)
-        period, step = sum(parts.times.values(), MX(0)), ca.fmax(at[STEP], LEAST_STEP)
-        energy = sum(parts.energies.values(), MX(0))
-        mean = sum((parts.objectives[name] * time for name, time in parts.times.items()), MX(0)) / period
-        single, double = parts.samples.values()
-        lift_off, jump = Switch(name="lift_off", mirrored=True).join(self.phases, at, double, single, ops)
-        touch_down, landing = self.touch_down.join(self.phases, at, single, double, ops)
+        extended = self.read_section(self.sections[0], point)
+        sections = self.assemble_sections(point, ops)
+        period, step = sum(sections.times.values(), MX(0)), ca.fmax(extended[STEP], LEAST_STEP)
+        energy = sum(sections.energies.values(), MX(0))
+        mean = sum((sections.objectives[name] * time for name, time in sections.times.items()), MX(0)) / period
+        single, double = sections.samples.values()
+        lift_off, jump = Switch(name="lift_off", mirrored=True).join(self.phases, extended, double, single, ops)
+        touch_down, landing = self.touch_down.join(self.phases, extended, single, double, ops)
         rows = [*lift_off, *touch_down]
         if self.at_given_speed:
-            rows.append(make_rows("step_length", "m", at[STEP], at[f"{STEP}.lower"], at[f"{STEP}.upper"], over="once"))
+            rows.append(
+                make_rows(
+                    "step_length",
+                    "m",
+                    extended[STEP],
+                    extended[f"{STEP}.lower"],
+                    extended[f"{STEP}.upper"],
+                    over="once",
+                )
+            )
         return Assembly(
             objective=mean if self.at_given_speed else energy / step,
-            constraints=(*parts.rows, *rows),
+            constraints=(*sections.rows, *rows),
             indexes={
                 "power_W": energy / period,
                 "energy_J_per_m": energy / step,
                 "cost_of_transport": energy / step / self.body.weight,
                 "speed_m_s": step / period,
                 "step_length_m": step,
-                **parts.indexes,
+                **sections.indexes,
                 **jump,
                 **landing,
             },
         )
 
-    def signals(self, at: Point) -> Signals:
+    def signals(self, point: Point) -> Signals:
         """Return time histories of the cycle at a point of numbers."""
-        return self.list_step_signals(at)[0]
+        return self.list_step_signals(point)[0]
 
 
 def make_walking_cycle(
@@ -160,9 +169,9 @@ def make_cycle_margins(body: Body) -> dict[Support, BalanceMargins]:
     feet, (left_y, right_y) = body.robot.feet, body.feet_y
     usual = make_support_box(body.robot, {"L": (0.0, left_y), "R": (body.step_length_m, right_y)})
 
-    def double(zmp: MX, at: Point, ops: Nonsmooth) -> tuple[MX, MX]:
+    def double(zmp: MX, point: Point, ops: Nonsmooth) -> tuple[MX, MX]:
         """In the box around the left foot and the right one a step ahead."""
-        step = at[STEP]
+        step = point[STEP]
         back = ca.fmin(-feet["left"].back_m, step - feet["right"].back_m)
         front = ca.fmax(feet["left"].front_m, step + feet["right"].front_m)
         return compute_margins(Box(back=back, front=front, right=usual.right, left=usual.left), zmp, ops)
@@ -179,8 +188,10 @@ def plan_cycle(
     cycle = make_walking_cycle(body, sharing, grid, goal, at_given_speed=at_given_speed, landing=landing)
     names = tuple(variable.name for variable in cycle.decisions)
 
-    def reach(at: Point) -> MX:
-        return ca.horzcat(*(cycle.phases[p.kind].sample(cycle.read_part(p, at), Exact()).reach for p in cycle.parts))
+    def reach(point: Point) -> MX:
+        return ca.horzcat(
+            *(cycle.phases[p.kind].sample(cycle.read_section(p, point), Exact()).reach for p in cycle.sections)
+        )
 
     drawn = at_given_speed or landing == "inelastic"
     start = sharing.start(names, partial(draw_start, names) if drawn else None)

@@ -81,7 +81,7 @@ def make_landing_rates(body: Body) -> list[Variable]:
 def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
     """Return the variables of the state at a switch of ``SWITCHES``, whose names contain ``name``."""
     height, vz, _, vx, _, vy, _ = make_hip_variables(body)
-    at = f"at {name.replace('_', '-')}"
+    point = f"at {name.replace('_', '-')}"
     low, high = (round(share * body.leg_length_m, 3) for share in HIP_X_SHARES[switch])
     table = [
         ("hip_x", "m", low, high, f"{body.hip_name} ahead of the left foot"),
@@ -95,7 +95,7 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
         table.append((c.name, "rad", *c.bounds, c.words))
         table.append((c.rate, "rad/s", -c.largest_rate, c.largest_rate, c.rate_words))
     rows = (
-        (f"{what}_{name}_{SUFFIXES[unit]}", unit, lower, upper, f"{words}, {at}")
+        (f"{what}_{name}_{SUFFIXES[unit]}", unit, lower, upper, f"{words}, {point}")
         for what, unit, lower, upper, words in table
     )
     return list(make_variables(*rows))
@@ -106,24 +106,24 @@ def make_cycle_planners(body: Body, inelastic: bool = False) -> dict[Support, Pl
     images = DM([c.image for c in body.coordinates])
     mirror = SX([1, -1, 1])
 
-    def read(at: InstantPoint) -> tuple[SwitchState, SwitchState, SX]:
+    def read(point: InstantPoint) -> tuple[SwitchState, SwitchState, SX]:
         """States at lift-off and touch-down, and the step length [m]."""
-        lift_off, touch_down = (read_state(at, switch, body.coordinates) for switch in SWITCHES)
-        return lift_off, touch_down, fmax(at[STEP], LEAST_STEP)
+        lift_off, touch_down = (read_state(point, switch, body.coordinates) for switch in SWITCHES)
+        return lift_off, touch_down, fmax(point[STEP], LEAST_STEP)
 
-    def single(at: InstantPoint) -> PhaseMotion:
-        lift_off, touch_down, step = read(at)
-        speed = at[LANDING] if inelastic else 0.0
-        return PhaseMotion(lift_off, touch_down, read_duration(at, Support.SINGLE), -step, step, at[LIFT], speed)
+    def single(point: InstantPoint) -> PhaseMotion:
+        lift_off, touch_down, step = read(point)
+        speed = point[LANDING] if inelastic else 0.0
+        return PhaseMotion(lift_off, touch_down, read_duration(point, Support.SINGLE), -step, step, point[LIFT], speed)
 
-    def double(at: InstantPoint) -> PhaseMotion:
-        (hip, velocity, angles, rates), touch_down, step = read(at)
+    def double(point: InstantPoint) -> PhaseMotion:
+        (hip, velocity, angles, rates), touch_down, step = read(point)
         place = mirror * hip + vertcat(step, 0, 0)  # the mirror image of lift-off, a step further
         if inelastic:
-            velocity_after, rates_after = read_rates(at, AFTER, body.coordinates)
+            velocity_after, rates_after = read_rates(point, AFTER, body.coordinates)
             touch_down = touch_down._replace(hip_velocity=velocity_after, others_rate=rates_after)
         end = SwitchState(place, mirror * velocity, images * angles, images * rates)
-        return PhaseMotion(touch_down, end, read_duration(at, Support.DOUBLE), step, step)
+        return PhaseMotion(touch_down, end, read_duration(point, Support.DOUBLE), step, step)
 
     return {Support.SINGLE: make_planner(body, single), Support.DOUBLE: make_planner(body, double)}
 
@@ -133,8 +133,8 @@ def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion], flight
     left, right = body.standing_ankle("L"), body.standing_ankle("R")
     right_y, right_z = body.ankle("R")
 
-    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
-        leg = read(at)
+    def plan(point: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+        leg = read(point)
         if leg.lift is None:
             height = 0 if flight is None else flight.slope * leg.right_to
             foot = right._replace(position=right.position + vertcat(leg.right_to, 0, height))
@@ -145,22 +145,22 @@ def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion], flight
                 leg.right_from, leg.right_to, right_y, right_z, leg.lift, leg.duration, phase, leg.landing_m_s
             )
         hip, angles = interpolate_states(leg.start, leg.end, leg.duration, phase)
-        return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": foot}, at[REACH_MARGIN], ops)
+        return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": foot}, point[REACH_MARGIN], ops)
 
     return plan
 
 
-def read_state(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> SwitchState:
+def read_state(point: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> SwitchState:
     """State of the variables whose names contain ``name``."""
-    velocity, rates = read_rates(at, name, coordinates)
-    hip = vertcat(*(at[f"hip_{axis}_{name}_m"] for axis in "xyz"))
-    return SwitchState(hip, velocity, vertcat(*(at[f"{c.name}_{name}_rad"] for c in coordinates)), rates)
+    velocity, rates = read_rates(point, name, coordinates)
+    hip = vertcat(*(point[f"hip_{axis}_{name}_m"] for axis in "xyz"))
+    return SwitchState(hip, velocity, vertcat(*(point[f"{c.name}_{name}_rad"] for c in coordinates)), rates)
 
 
-def read_rates(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> tuple[SX, SX]:
+def read_rates(point: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> tuple[SX, SX]:
     """Return velocity of the hip (3,) [m/s] and rates of all coordinates (k,) [rad/s] at the state of a name."""
-    velocity = vertcat(*(at[f"hip_v{axis}_{name}_m_s"] for axis in "xyz"))
-    return velocity, vertcat(*(at[f"{c.rate}_{name}_rad_s"] for c in coordinates))
+    velocity = vertcat(*(point[f"hip_v{axis}_{name}_m_s"] for axis in "xyz"))
+    return velocity, vertcat(*(point[f"{c.rate}_{name}_rad_s"] for c in coordinates))
 
 
 def interpolate_states(

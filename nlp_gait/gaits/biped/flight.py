@@ -53,7 +53,7 @@ class Flight:
 
         def along(shape: Polynomial, start: SX | float, way: SX) -> Motion:
             orders = (ca.polyval(DM(shape.deriv(k).coef[::-1]), s) / duration**k for k in range(3))
-            position, *rates = (way * part for part in orders)
+            position, *rates = (way * order for order in orders)
             return Motion(start + position, *rates)
 
         way = end_x - start_x

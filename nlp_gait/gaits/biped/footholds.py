@@ -48,7 +48,7 @@ def parse_footholds(text: str) -> tuple[Foothold, ...]:
     footholds = []
     for k, row in enumerate(text.split(";"), 1):
         try:
-            x, y, z, yaw = (float(part) for part in row.split(","))
+            x, y, z, yaw = (float(cell) for cell in row.split(","))
         except ValueError:
             raise InputError(f"foothold {k} must be four numbers {COLUMNS}, got {row.strip()!r}") from None
         if not all(math.isfinite(value) for value in (x, y, z, yaw)):

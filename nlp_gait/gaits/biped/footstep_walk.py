@@ -22,10 +22,10 @@ from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, R
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Instant, Planner
-from nlp_gait.gaits.biped.sequence import End, Part
+from nlp_gait.gaits.biped.sequence import End, Section
 from nlp_gait.gaits.biped.support_phases import compute_sole_margins, limit_to_sole
 from nlp_gait.gaits.biped.walk import NO_LIMIT, WholeWalk, make_speed_row, make_walk_phases, make_walk_problem
-from nlp_gait.gaits.biped.walk_parts import DURATION, SHIFT, STAND, State, make_phase_variables, make_pose_variables
+from nlp_gait.gaits.biped.walk_sections import DURATION, SHIFT, STAND, State, make_phase_variables, make_pose_variables
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic, parabola_lift, stack
 
@@ -49,7 +49,7 @@ class FootstepWalk(WholeWalk):
         """Half the way of each step's foot [m]."""
         return [math.dist(a[:2], b[:2]) / 2 for a, b in zip(self.feet, self.feet[2:], strict=False)]
 
-    def find_distance(self, at: Point, inner: MX) -> MX:
+    def find_distance(self, point: Point, inner: MX) -> MX:
         """Return the mean of the lengths of both feet's paths [m]."""
         return MX(sum(self.advances))
 
@@ -64,28 +64,28 @@ class FootstepWalk(WholeWalk):
         )
         return make_parameters(*rows)
 
-    def limit_speed(self, at: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
+    def limit_speed(self, point: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
         """Return the rows of the inner steps: what both feet advance on average in a swing and the double support after it."""
         rows = []
         for k in range(2, self.steps):
             speed = self.advances[k - 1] / (times[f"step{k}_ssp"] + times[f"step{k}_dsp"])
-            least, greatest = (at[name_speed(end, k)] for end in ("least", "greatest"))
+            least, greatest = (point[name_speed(end, k)] for end in ("least", "greatest"))
             rows.append(make_speed_row(f"step{k}_speed", speed, least, greatest))
         return rows, {}
 
-    def limit_part(self, part: Part) -> Phase:
-        """Return the phase with the limits of a part: in double support, the ZMP is limited by the hull of both soles."""
-        phase = self.phases[part.kind]
-        if part.kind is not Support.DOUBLE:
+    def limit_section(self, section: Section) -> Phase:
+        """Return the phase with the limits of a section: in double support, the ZMP is limited by the hull of both soles."""
+        phase = self.phases[section.kind]
+        if section.kind is not Support.DOUBLE:
             return phase
-        return replace_margins(phase, make_stance_margins(self.body, part.feet[1]))
+        return replace_margins(phase, make_stance_margins(self.body, section.feet[1]))
 
-    def place_right_foot(self, part: Part, at: NumericPoint) -> tuple[list[Any], Foothold]:
-        """Return the last variables of a part's phase, ``RIGHT``, and where the right foot is at its end."""
-        begin, end = part.feet
+    def place_right_foot(self, section: Section, point: NumericPoint) -> tuple[list[Any], Foothold]:
+        """Return the last variables of a section's phase, ``RIGHT``, and where the right foot is at its end."""
+        begin, end = section.feet
         return [*begin, *end], end
 
-    def place_steps(self, at: NumericPoint) -> Array:
+    def place_steps(self, point: NumericPoint) -> Array:
         """Return the places (K, 4) of the standing feet: x, y, z [m] and yaw [rad]."""
         places = []
         for k, stance in enumerate(self.feet[1:-1], 1):
@@ -94,22 +94,22 @@ class FootstepWalk(WholeWalk):
         return np.array(places)
 
 
-def list_footstep_parts(body: Body, feet: tuple[Foothold, ...]) -> tuple[Part, ...]:
+def list_footstep_sections(body: Body, feet: tuple[Foothold, ...]) -> tuple[Section, ...]:
     """Return all phases of a walk in the order of time; its states are lift-off and touch-down of each step."""
     swings = list_swings(feet[2:], body.feet_y)
     first = (swings[0][0],) * 2
-    shift = Part("shift", Support.STAND, End(), End(0), first, SHIFT)
-    parts = [shift._replace(name=STAND, end=End(), occurs=0), shift]
+    shift = Section("shift", Support.STAND, End(), End(0), first, SHIFT)
+    sections = [shift._replace(name=STAND, end=End(), occurs=0), shift]
     for k, (lifted, landed) in enumerate(swings):
         single, double, lift = (f"step{k + 1}_{name}" for name in (*TIMES.values(), LIFT))
         lift_off, touch_down, last = End(2 * k), End(2 * k + 1), k + 1 == len(swings)
         kind = Support.STAND if np.allclose(landed, first[0], atol=BESIDE) else Support.DOUBLE
         end, stance = End() if last else End(2 * k + 2, mirrored=True), (landed, landed)
-        parts += [
-            Part(f"step{k + 1}_ssp", Support.SINGLE, lift_off, touch_down, (lifted, landed), single, lift, k + 1),
-            Part(f"step{k + 1}_dsp", kind, touch_down, end, stance, double, step=k + 1),
+        sections += [
+            Section(f"step{k + 1}_ssp", Support.SINGLE, lift_off, touch_down, (lifted, landed), single, lift, k + 1),
+            Section(f"step{k + 1}_dsp", kind, touch_down, end, stance, double, step=k + 1),
         ]
-    return (*parts, parts[-1]._replace(name=STAND_AT_END, begin=End(), occurs=0))
+    return (*sections, sections[-1]._replace(name=STAND_AT_END, begin=End(), occurs=0))
 
 
 def list_states(steps: int) -> tuple[State, ...]:
@@ -138,7 +138,7 @@ def make_stance_margins(body: Body, right: Foothold) -> BalanceMargins:
 def make_polygon_margins(sides: Array) -> Margins:
     """Return the balance margins in x and y: distances along the axes to the sides (n, 3) of a convex polygon."""
 
-    def margins(zmp: MX, at: Point, ops: Nonsmooth) -> tuple[MX, MX]:
+    def margins(zmp: MX, point: Point, ops: Nonsmooth) -> tuple[MX, MX]:
         def measure(axis: int) -> MX:
             slanted = [side for side in sides.tolist() if abs(side[axis]) > LEAST_SLANT]
             return ops.min(*(((d - x * zmp[0, :] - y * zmp[1, :]) / abs((x, y)[axis])).T for x, y, d in slanted)).T
@@ -152,20 +152,21 @@ def make_footstep_planner(body: Body, turning: bool, swings: bool) -> Planner:
     """Return the plan of a phase over the left foot: the right one swings straight to its foothold, or stands on it."""
     left, (_, height) = body.standing_ankle("L"), body.ankle("R")
 
-    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
-        begin, end = (read_state(at, name, body.coordinates) for name in ("begin", "end"))
-        hip, angles = interpolate_states(begin, end, at[DURATION], phase)
+    def plan(point: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+        begin, end = (read_state(point, name, body.coordinates) for name in ("begin", "end"))
+        hip, angles = interpolate_states(begin, end, point[DURATION], phase)
         share, rise = constant_motion(1.0), constant_motion(0.0)
         if swings:
-            share = cubic(SX(0), SX(1), SX(0), SX(0), at[DURATION], phase)
-            rise = parabola_lift(share, 0.0, 1.0, at[LIFT])
+            share = cubic(SX(0), SX(1), SX(0), SX(0), point[DURATION], phase)
+            rise = parabola_lift(share, 0.0, 1.0, point[LIFT])
         ends = zip(RIGHT[:3], RIGHT[3:], strict=True)
         x, y, yaw = (
-            Motion(at[a] + (at[b] - at[a]) * share[0], *((at[b] - at[a]) * s for s in share[1:])) for a, b in ends
+            Motion(point[a] + (point[b] - point[a]) * share[0], *((point[b] - point[a]) * s for s in share[1:]))
+            for a, b in ends
         )
         foot = stack(x, y, rise._replace(position=rise.position + height))
-        turns = {TORSO_YAW: Motion(*(part / 2 for part in yaw)), RIGHT_YAW: yaw} if turning else {}
-        return body.plan(hip, {**body.cycle_angles(angles), **turns}, {"L": left, "R": foot}, at[REACH_MARGIN], ops)
+        turns = {TORSO_YAW: Motion(*(order / 2 for order in yaw)), RIGHT_YAW: yaw} if turning else {}
+        return body.plan(hip, {**body.cycle_angles(angles), **turns}, {"L": left, "R": foot}, point[REACH_MARGIN], ops)
 
     return plan
 
@@ -210,7 +211,7 @@ def plan_footstep_walk(body: Body, footholds: tuple[Foothold, ...], steps: int, 
         feet=feet,
         variables=both_ways,
         phases=phases,
-        parts=list_footstep_parts(body, feet),
+        sections=list_footstep_sections(body, feet),
         states=list_states(steps),
     )
     return make_walk_problem(walk, variables)

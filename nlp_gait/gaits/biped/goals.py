@@ -20,10 +20,10 @@ HEAT_LOSS = Parameter(
 PowerModel: TypeAlias = Callable[[Point, Samples, Nonsmooth], MX]
 
 
-def compute_paper_power(at: Point, samples: Samples, ops: Nonsmooth) -> MX:
+def compute_paper_power(point: Point, samples: Samples, ops: Nonsmooth) -> MX:
     """Compute the mean electrical power over time [W]: braking costs like driving, one K (eq. 32; (P.1), (P.2))."""
     mechanical = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
-    return samples.average(ca.sum1(mechanical) + at[HEAT_LOSS.name] * ca.sum1(samples.torque**2))
+    return samples.average(ca.sum1(mechanical) + point[HEAT_LOSS.name] * ca.sum1(samples.torque**2))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,14 +35,14 @@ class Goal:
     figure: Callable[[Samples], MX] | None = None  # of the samples; None for power
     heat: Parameter = HEAT_LOSS  # parameter K with the robot's default
 
-    def evaluate(self, at: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX], Mapping[str, MX]]:
+    def evaluate(self, point: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX], Mapping[str, MX]]:
         """Return the objective, and the indexes before and after those of the limits."""
         if self.figure is not None:
             figure = self.figure(samples)
-            return figure, {"power_W": compute_paper_power(at, samples, Exact())}, {self.objective.name: figure}
-        power = self.power(at, samples, ops)
+            return figure, {"power_W": compute_paper_power(point, samples, Exact())}, {self.objective.name: figure}
+        power = self.power(point, samples, ops)
         paper = (
-            {} if self.power is compute_paper_power else {"paper_power_W": compute_paper_power(at, samples, Exact())}
+            {} if self.power is compute_paper_power else {"paper_power_W": compute_paper_power(point, samples, Exact())}
         )
         return power, {"power_W": power}, paper
 

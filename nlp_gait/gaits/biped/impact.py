@@ -29,7 +29,7 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 class ReadRates(Limit):
     """Not a limit: it asks a phase for the angles of all joints and their rates."""
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         for name in ("all_q", "all_qd"):
             samples.read(name)
         return (), {}
@@ -40,20 +40,20 @@ class Impact(Switch):
     """A touch-down at which the landing foot stops at once, and all joints go on with other rates."""
 
     def join(
-        self, phases: Mapping[Support, Phase], at: Point, before: Samples, after: Samples, ops: Nonsmooth
+        self, phases: Mapping[Support, Phase], point: Point, before: Samples, after: Samples, ops: Nonsmooth
     ) -> tuple[list[Constraint], dict[str, MX]]:
         """Return the rows and indexes of any switch, and of the impact: momentum [N s], energy [J], rates [rad/s]."""
-        rows, indexes = super().join(phases, at, before, after, ops)
+        rows, indexes = super().join(phases, point, before, after, ops)
         single, double = (replace(phases[kind], limits=(ReadRates(),)) for kind in (Support.SINGLE, Support.DOUBLE))
         body = single.body
-        landing = single.sample(at, ops, MX(1.0)).read("all_qd")[:, 0]
+        landing = single.sample(point, ops, MX(1.0)).read("all_qd")[:, 0]
         variables = make_landing_rates(body)
         names = [variable.name for variable in variables]
         # The rates of joints are linear in the planned velocities: one instant for each unit velocity.
-        units = [at.with_values({name: MX(float(name == unit)) for name in names}) for unit in names]
+        units = [point.with_values({name: MX(float(name == unit)) for name in names}) for unit in names]
         instants = double.sample_several(units, ops, MX(0.0))
         directions = ca.horzcat(*(instant.read("all_qd") for instant in instants))
-        jump = directions @ ca.vertcat(*(at[name] for name in names)) - landing
+        jump = directions @ ca.vertcat(*(point[name] for name in names)) - landing
         impulses, force = make_impulses(body)(instants[0].read("all_q"), jump)
         for variable, change in zip(variables, ca.vertsplit(directions.T @ impulses), strict=True):
             unit = "N s" if variable.unit == "m/s" else "Nm s"
@@ -74,6 +74,6 @@ def make_impulses(body: Body) -> ca.Function:
     """
     q, jump = (SX.sym(name, len(body.joints)) for name in ("q", "jump"))
     tree = make_tree(body.robot, body.robot.feet["left"].link, body.joints)
-    at, moved = (dict(zip(body.joints, ca.vertsplit(part), strict=True)) for part in (q, jump))
-    torques, wrench = newton_euler(tree, at, dict.fromkeys(body.joints, SX(0)), moved, 0.0)
+    point, moved = (dict(zip(body.joints, ca.vertsplit(vector), strict=True)) for vector in (q, jump))
+    torques, wrench = newton_euler(tree, point, dict.fromkeys(body.joints, SX(0)), moved, 0.0)
     return ca.Function("impulses", [q, jump], [ca.vertcat(*(torques[name] for name in body.joints)), wrench.force])

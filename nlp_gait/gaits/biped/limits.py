@@ -39,7 +39,7 @@ class Limit(ABC):
     parameters: tuple[Parameter, ...] = ()  # of the limit, which can be changed without rebuilding
 
     @abstractmethod
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         """Return the rows at a point, and performance indexes by name."""
 
 
@@ -78,9 +78,9 @@ class JointLimits(Limit):
             for end, value in zip(("lower", "upper"), both, strict=True)
         )
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n = samples.steps + 1
-        limits = (ca.vertcat(*(at[f"{joint}_rad.{end}"] for joint in self._planned)) for end in ("lower", "upper"))
+        limits = (ca.vertcat(*(point[f"{joint}_rad.{end}"] for joint in self._planned)) for end in ("lower", "upper"))
         lower, upper = (ca.repmat(limit, n, 1) for limit in limits)
         return [make_rows_at_samples("joint_angle", "rad", samples.planned, self._planned, lower, upper)], {}
 
@@ -92,15 +92,15 @@ class Reach(Limit):
         (REACH_MARGIN, "1", 0.01, "distance of a knee's cosine from +-1: 0.01 keeps it bent by 0.14 rad", 0.0, 0.5)
     )
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        limit = 1 - at[REACH_MARGIN]
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        limit = 1 - point[REACH_MARGIN]
         return [make_rows_at_samples("reach", "1", samples.reach, LEGS, -limit, limit)], {}
 
 
 class Closure(Limit):
     """Legs that end at their feet where Newton's method computes their angles; gradient solvers have equations instead."""
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         # A gradient solver needs the same rows in the same places: there they are far below their bound.
         miss = samples.miss if ops.exact else -MX.ones(len(LEGS), samples.steps + 1)
         return [make_rows_at_samples("closure", "m", miss, LEGS, None, MX(CLOSURE_M))], {}
@@ -112,7 +112,7 @@ class DriveLimits(Limit):
     def __init__(self, robot: Robot, size: float) -> None:
         self._robot, self._size = robot, size
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n = samples.steps + 1
         effort = DM([self._robot.joint(joint).torque_limit_Nm for joint in samples.joints])
         speed = DM([self._robot.joint(joint).velocity_limit_rad_s for joint in samples.moving])
@@ -135,10 +135,10 @@ class TorqueChange(Limit):
             ("torque_change_limit_Nm", "Nm", limit, "largest change of a torque over one interval", 0.0, math.inf)
         )
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         step = samples.grid.samples_per_interval
         change = samples.torque[:, step:] - samples.torque[:, :-step]
-        limit = at["torque_change_limit_Nm"]
+        limit = point["torque_change_limit_Nm"]
         names = make_labels(samples.joints, range(change.shape[1]))
         return [make_rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, "interval", self._size)], {
             "torque_change_Nm": ca.mmax(ca.fabs(change))
@@ -175,17 +175,17 @@ class BalanceMargins(Limit):
             ("dbm_y_mean_limit_m", "m", y, "least mean margin in y", -math.inf, math.inf),
         )
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n = samples.steps + 1
-        margins = dict(zip("xy", self._margins(samples.zmp, at, ops), strict=True))
+        margins = dict(zip("xy", self._margins(samples.zmp, point, ops), strict=True))
         means = {axis: samples.average_margins(margin) for axis, margin in margins.items()}
         names = [str(k) for k in range(n)]
         least = [
-            make_rows(f"dbm_{axis}", "m", margin.T, at[f"dbm_{axis}_min_limit_m"], labels=names, over="instant")
+            make_rows(f"dbm_{axis}", "m", margin.T, point[f"dbm_{axis}_min_limit_m"], labels=names, over="instant")
             for axis, margin in margins.items()
         ]
         mean = [
-            make_rows(f"dbm_{axis}_mean", "m", value, at[f"dbm_{axis}_mean_limit_m"], over="mean")
+            make_rows(f"dbm_{axis}_mean", "m", value, point[f"dbm_{axis}_mean_limit_m"], over="mean")
             for axis, value in means.items()
         ]
         return (*least, *mean), {
@@ -201,7 +201,7 @@ class AngleLimits(Limit):
         self._name, self._joints = name, tuple(joints)
         self._limits = np.array([robot.joint(joint).planning_limits_rad for joint in joints])
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         angles = samples.read(self._name)[:, 1:-1]
         lower, upper = (MX(DM(np.tile(limits, angles.shape[1]))) for limits in self._limits.T)
         return [make_rows_at_samples(self._name, "rad", angles, self._joints, lower, upper, first=1)], {}
@@ -213,15 +213,15 @@ class SplineClearance(Limit):
     def __init__(self, path: Callable[[InstantPoint, ca.SX], ca.SX], middle: float, least_height: str) -> None:
         self._path, self._middle, self._least_height = path, middle, least_height
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n, heights = samples.steps, samples.swing_heights[1:-1]
         above = make_rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)], over="instant")
         # Half the phase is a sample only on some grids.
-        names = [name for name, (kind, _) in at.positions.items() if kind == "x"]
+        names = [name for name, (kind, _) in point.positions.items() if kind == "x"]
         x = ca.SX.sym("x", len(names))
         path = self._path(InstantPoint.of(x, ca.SX(0, 1), names, ()), ca.SX(0.5))
-        halfway = ca.Function("halfway", [x], [path])(at.x)
-        return (above, *make_halfway_rows(halfway[0], self._middle, halfway[2], at[self._least_height])), {}
+        halfway = ca.Function("halfway", [x], [path])(point.x)
+        return (above, *make_halfway_rows(halfway[0], self._middle, halfway[2], point[self._least_height])), {}
 
 
 def make_halfway_rows(
@@ -247,12 +247,12 @@ class FrictionCone(Limit):
 
     parameters = table(("friction_coefficient", "1", 0.6, "of both soles on the ground", 0.0, math.inf))
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         rows, ratios = [], []
         for side in samples.standing:
             force = samples.wrench(side)[:3, :]
             tangential = ca.sqrt(force[0, :] ** 2 + force[1, :] ** 2 + SMOOTH_N**2)
-            slack = at["friction_coefficient"] * force[2, :] - tangential
+            slack = point["friction_coefficient"] * force[2, :] - tangential
             rows.append(make_rows_at_samples("friction", "N", slack, (BOTH_FEET[side],), MX(0.0)))
             ratios.append(ca.mmax(tangential / ca.fmax(force[2, :], SMOOTH_N)))
         return rows, {
@@ -275,12 +275,12 @@ class FootClearance(Limit):
         ("foot_clearance_m", "m", 0.01, "of the swinging sole in the middle of its swing", 0.0, math.inf)
     )
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         if len(samples.standing) > 1:
             return [], {}
         s, heights = samples.progress[1:-1], samples.swing_heights[:, 1:-1]
         points = CORNERS if heights.shape[0] > 1 else ("sole",)
-        needed = at["foot_clearance_m"] * 16 * s**2 * (1 - s) ** 2
+        needed = point["foot_clearance_m"] * 16 * s**2 * (1 - s) ** 2
         above = heights - ca.repmat(needed, len(points), 1)
         return [make_rows_at_samples("foot_clearance", "m", above, points, MX(0.0), first=1)], {
             "foot_clearance_m": ca.mmax(samples.swing_heights)

@@ -96,9 +96,9 @@ class PlannedLoad(LoadSharing):
     def add_to(self, plan: Planner) -> Planner:
         names = [variable.name for variable in self.variables]
 
-        def plan_with_load(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
-            instant, s = plan(at, phase, ops), SX.sym("s")
-            values = ca.reshape(ca.vertcat(*(at[name] for name in names)), self._count, len(COMPONENTS))
+        def plan_with_load(point: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+            instant, s = plan(point, phase, ops), SX.sym("s")
+            values = ca.reshape(ca.vertcat(*(point[name] for name in names)), self._count, len(COMPONENTS))
             basis = load_basis(self._degree, s)
             shapes = ca.Function("shapes", [s], [basis, ca.jacobian(basis, s)])
             load, slope = (values.T @ shape for shape in shapes(phase))
@@ -171,8 +171,8 @@ class FootLimits(Limit):
     def __init__(self, body: Body) -> None:
         self._feet, self._weight = body.robot.feet, body.weight
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        n, mu = samples.steps + 1, at["friction_coefficient"]
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        n, mu = samples.steps + 1, point["friction_coefficient"]
         rows, loads = [], {}
         for side, foot in BOTH_FEET.items():
             kinds = _make_bearing_function(self._feet[foot]).map(n)(samples.wrench(side), ca.repmat(mu, 1, n))
@@ -184,13 +184,13 @@ class FootLimits(Limit):
         total = loads["left"] + loads["right"]
         changes = (total[1:] - total[:-1]) / samples.step_s
         rates = {"left": ca.horzcat(changes[0], (changes[:-1] + changes[1:]) / 2, changes[-1]) - right, "right": right}
-        limit, names = at["load_rate_limit_1_s"], make_labels(tuple(rates), range(n))
+        limit, names = point["load_rate_limit_1_s"], make_labels(tuple(rates), range(n))
         ends = ca.vertcat(loads["right"][0], loads["left"][-1])
         feet = ("right, landed", "left, lifting")
         return (
             *rows,
             make_rows("load_rate", "1/s", ca.vec(ca.vertcat(*rates.values())), -limit, limit, names, "samples"),
-            make_rows("switch_load", "1", ends, None, at["switch_load_limit"], feet, over="once"),
+            make_rows("switch_load", "1", ends, None, point["switch_load_limit"], feet, over="once"),
         ), {"load_rate_1_s": ca.mmax(ca.fabs(ca.vertcat(*rates.values()))), "switch_load": ca.mmax(ends)}
 
 

@@ -125,7 +125,9 @@ def make_divided_loads(body: Body, rule: Division) -> Loader:
             acting = find_zmp_wrench(body, half, now.joints, wrench)
             height = foot.ankle_height_m
             if side == "R" and now.yaw.shape[0]:  # from the axes of its foot
-                wrench, acting = (Wrench(*(axis_rotation(UP, now.yaw) @ part for part in w)) for w in (wrench, acting))
+                wrench, acting = (
+                    Wrench(*(axis_rotation(UP, now.yaw) @ vector for vector in w)) for w in (wrench, acting)
+                )
             wrenches[side] = balance.shift_down(wrench, height)
             torques |= of_half
             zmps.append(now.ankles[side][:2] + balance.zmp_of_wrench(acting, height, weight))

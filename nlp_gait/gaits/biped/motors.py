@@ -45,7 +45,7 @@ SUPPLY = Parameter(
 
 def parse_features(text: str) -> tuple[str, ...]:
     """Return the features that an option's text lists, separated by commas."""
-    return tuple(part.strip() for part in text.split(",") if part.strip())
+    return tuple(feature.strip() for feature in text.split(",") if feature.strip())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,7 +97,7 @@ class Motors:
         """Mean power of the motors; None for the paper's model."""
         return self._mean_power if {"free-braking", "regeneration", "heat"} & set(self.features) else None
 
-    def _mean_power(self, at: Point, samples: Samples, ops: Nonsmooth) -> MX:
+    def _mean_power(self, point: Point, samples: Samples, ops: Nonsmooth) -> MX:
         driven = ca.vec(samples.power)
         if "regeneration" in self.features:
             mechanical = driven
@@ -109,7 +109,7 @@ class Motors:
             constants = DM([rating.heat_W_per_Nm2 for rating in self._ratings])
             heat = constants.T @ self.sum_by_motor(samples.torque) ** 2
         else:
-            heat = at[HEAT_LOSS.name] * ca.sum1(samples.torque**2)
+            heat = point[HEAT_LOSS.name] * ca.sum1(samples.torque**2)
         return samples.average(ca.sum1(ca.reshape(mechanical, *samples.power.shape)) + heat)
 
     @cached_property
@@ -146,8 +146,8 @@ class MotorLimits(Limit):
     def __init__(self, motors: Motors, ratings: Sequence[Motor]) -> None:
         self._motors, self._ratings = motors, ratings
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        torque, qd, moving, supply = samples.torque, samples.qd, samples.moving, at[SUPPLY.name]
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        torque, qd, moving, supply = samples.torque, samples.qd, samples.moving, point[SUPPLY.name]
         n = torque.shape[1]
         joints = self._motors.joints
         motors = [k for k, joint in enumerate(joints) if joint not in self._motors.shared[1:]]

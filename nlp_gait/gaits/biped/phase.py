@@ -104,11 +104,11 @@ class Phase:
             unique.setdefault(parameter.name, parameter)
         return tuple(sorted(unique.values(), key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
 
-    def assemble(self, at: Point, ops: Nonsmooth, samples: Samples | None = None) -> Assembly:
+    def assemble(self, point: Point, ops: Nonsmooth, samples: Samples | None = None) -> Assembly:
         """Return the rows of all limits, the goal, and the indexes of both; by default at all samples."""
-        samples = self.sample(at, ops) if samples is None else samples
-        added = [limit.add(at, samples, ops) for limit in self.every_limit]
-        value, before, after = self.goal.evaluate(at, samples, ops)
+        samples = self.sample(point, ops) if samples is None else samples
+        added = [limit.add(point, samples, ops) for limit in self.every_limit]
+        value, before, after = self.goal.evaluate(point, samples, ops)
         indexes = {name: index for _, limit_indexes in added for name, index in limit_indexes.items()}
         return Assembly(
             objective=value,
@@ -116,9 +116,9 @@ class Phase:
             indexes={**before, **indexes, **after},
         )
 
-    def sample(self, at: Point, ops: Nonsmooth, phases: MX | None = None) -> Samples:
+    def sample(self, point: Point, ops: Nonsmooth, phases: MX | None = None) -> Samples:
         """Evaluate the phase at N + 1 equidistant samples, or with analytic derivatives at other phases (1, k); one map."""
-        return self.sample_several([at], ops, phases)[0]
+        return self.sample_several([point], ops, phases)[0]
 
     def sample_several(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None = None) -> list[Samples]:
         """Evaluate the phase at several points in one map, each as ``sample`` does; several need analytic derivatives."""
@@ -128,18 +128,18 @@ class Phase:
                 moving=self.moving,
                 standing=self.standing,
                 grid=self.grid if phases is None else Grid(intervals=max(int(phases.shape[1]) - 1, 1)),
-                duration=at[self.duration],
+                duration=point[self.duration],
                 progress=self.grid.progress if phases is None else phases,
                 values=values,
             )
-            for at, values in zip(ats, self._evaluate(ats, ops, phases), strict=True)
+            for point, values in zip(ats, self._evaluate(ats, ops, phases), strict=True)
         ]
 
     def _evaluate(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[dict[str, MX]]:
         """Return the quantities that limits and the goal read, by name, at each point."""
         if self.derivatives != "analytic":
             stages = self._make_stages(self._symbolic_plan(ops), self._names_read)
-            return [self._evaluate_stages(stages, at) for at in ats]
+            return [self._evaluate_stages(stages, point) for point in ats]
         columns = self._map_instant(ats, ops, phases)
         split = [[values] if len(ats) == 1 else ca.horzsplit(values, values.shape[1] // len(ats)) for values in columns]
         return [
@@ -159,19 +159,19 @@ class Phase:
         """What limits and the goal read, found by adding them to symbols in place of samples."""
         parameters = [parameter.name for parameter in self.parameters]
         x, p = MX.sym("x", len(self.variables)), MX.sym("p", len(parameters))
-        at = Point.of(x, p, self.names, parameters)
+        point = Point.of(x, p, self.names, parameters)
         symbols = Placeholders(
             joints=self.body.joints,
             moving=self.moving,
             standing=self.standing,
             grid=self.grid,
-            duration=at[self.duration],
+            duration=point[self.duration],
             progress=self.grid.progress,
             rows=lambda name: int(self.measure(name, self._exact_now).shape[0]),
         )
         for limit in self.every_limit:
-            limit.add(at, symbols, Exact())
-        self.goal.evaluate(at, symbols, Exact())
+            limit.add(point, symbols, Exact())
+        self.goal.evaluate(point, symbols, Exact())
         return symbols
 
     @property
@@ -184,8 +184,8 @@ class Phase:
         if self.derivatives != "analytic":
             return ()
 
-        def assemble(at: Point, phases: MX, ops: Nonsmooth) -> Assembly:
-            return self.assemble(at, ops, self.sample(at, ops, phases))
+        def assemble(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+            return self.assemble(point, ops, self.sample(point, ops, phases))
 
         def times(values: Mapping[str, float]) -> tuple[float, float]:
             start = sum(max(values[earlier], LEAST_DURATION) for earlier in begins)
@@ -197,23 +197,23 @@ class Phase:
         )
         return (rows,)
 
-    def signals(self, at: NumericPoint) -> Signals:
+    def signals(self, point: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
-        found = {name: _to_array(values) for name, values in self._evaluate_histories(at).items()}
+        histories = {name: _to_array(values) for name, values in self._evaluate_histories(point).items()}
         n = self.grid.parts + 1
         arrays = {
-            "t": _to_array(at[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
-            **{name: found[quantity] for name, quantity in HISTORIES.items()},
+            "t": _to_array(point[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
+            **{name: histories[quantity] for name, quantity in HISTORIES.items()},
             **{
-                f"{foot}_{half}": part
+                f"{foot}_{half}": rows
                 for side, foot in BOTH_FEET.items()
-                for half, part in zip(("force", "moment"), np.hsplit(found[f"wrench_{side}"], 2), strict=True)
+                for half, rows in zip(("force", "moment"), np.hsplit(histories[f"wrench_{side}"], 2), strict=True)
             },
         }
-        if found["attitude"].size:
-            arrays["attitude"] = found["attitude"]
-        if found["yaw"].size:
-            arrays["feet_yaw"] = np.column_stack([np.zeros(n), found["yaw"]])
+        if histories["attitude"].size:
+            arrays["attitude"] = histories["attitude"]
+        if histories["yaw"].size:
+            arrays["feet_yaw"] = np.column_stack([np.zeros(n), histories["yaw"]])
         columns = COLUMNS | {name: SIMULATED[name] for name in ("attitude", "feet_yaw") if name in arrays}
         return Signals(joints=self.body.joints, arrays=arrays, columns=columns)
 
@@ -234,8 +234,8 @@ class Phase:
 
     def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], Instant]:
         x, margin, phase = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("phase")
-        at = InstantPoint.of(x, margin, self.names, (REACH_MARGIN,))
-        return [x, margin, phase], self.plan(at, phase, ops)
+        point = InstantPoint.of(x, margin, self.names, (REACH_MARGIN,))
+        return [x, margin, phase], self.plan(point, phase, ops)
 
     @cached_property
     def _exact_now(self) -> Instant:
@@ -283,19 +283,19 @@ class Phase:
         motion = ca.Function("motion", inputs, outputs)
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
         given = SX.sym("world", ca.vertcat(*world).shape[0])
-        ends = np.cumsum([0, *(part.shape[0] for part in world)]).tolist()
+        ends = np.cumsum([0, *(vector.shape[0] for vector in world)]).tolist()
         hip, left, right, wrench, yaw = ca.vertsplit(given, ends)
-        moved = {name: Motion(*(part[i] for part in parts)) for i, name in enumerate(self.moving)}
+        moved = {name: Motion(*(order[i] for order in parts)) for i, name in enumerate(self.moving)}
         joints = {**self._exact_plan[1].joints, **moved}
         now = self.loads(Instant(joints=joints, hip=hip, ankles={"L": left, "R": right}, wrench=wrench, yaw=yaw))
         loads = ca.Function("loads", [*parts, given], [self.measure(name, now) for name in of_loads])
         return Stages(motion, loads, of_motion, of_loads, tuple(names))
 
-    def _evaluate_stages(self, stages: "Stages", at: NumericPoint) -> dict[str, MX]:
+    def _evaluate_stages(self, stages: "Stages", point: NumericPoint) -> dict[str, MX]:
         """Evaluate quantities at all samples, by their names; derivatives may be finite differences."""
-        q, qd, qdd, world, *of_motion = self._map(stages.motion, [at])
+        q, qd, qdd, world, *of_motion = self._map(stages.motion, [point])
         if self.derivatives != "analytic":
-            qd, qdd = self._differences(q, at)
+            qd, qdd = self._differences(q, point)
         rows = [self.body.joints.index(name) for name in self.moving]
         loads = stages.loads.map(self.grid.parts + 1)(q[rows, :], qd[rows, :], qdd[rows, :], world)
         values = dict(zip(stages.of_motion, of_motion, strict=True))
@@ -303,8 +303,8 @@ class Phase:
         values |= {"all_q": q, "all_qd": qd, "all_qdd": qdd}  # see ``ALL_JOINTS``
         return {name: values[name] for name in stages.names}
 
-    def _evaluate_histories(self, at: NumericPoint) -> dict[str, MX]:
-        return self._evaluate_stages(self._history_stages, at)
+    def _evaluate_histories(self, point: NumericPoint) -> dict[str, MX]:
+        return self._evaluate_stages(self._history_stages, point)
 
     @cached_property
     def _history_stages(self) -> "Stages":
@@ -321,16 +321,16 @@ class Phase:
             function, last = tabulate_last_input(function, DM(np.linspace(0.0, 1.0, n)).T)
         points = [
             [
-                ca.repmat(at.select(self.names).x, 1, n),
-                ca.repmat(at[REACH_MARGIN], 1, n),
+                ca.repmat(point.select(self.names).x, 1, n),
+                ca.repmat(point[REACH_MARGIN], 1, n),
                 last,
             ]
-            for at in ats
+            for point in ats
         ]
         inputs = points[0] if len(ats) == 1 else [ca.horzcat(*parts) for parts in zip(*points, strict=True)]
         return list(function.map(n * len(ats)).call([*columns, *inputs]))
 
-    def _differences(self, q: MX, at: Point) -> tuple[MX, MX]:
+    def _differences(self, q: MX, point: Point) -> tuple[MX, MX]:
         """Differentiate sampled angles (m, N + 1) twice: central differences, one-sided at the ends.
 
         Source:
@@ -340,10 +340,10 @@ class Phase:
         stencil = np.zeros((n, n))
         end = (-1.0, 1.0) if self.derivatives == "finite-difference" else (-1.5, 2.0, -0.5)
         stencil[0, : len(end)] = end
-        stencil[-1, -len(end) :] = [-part for part in reversed(end)]
+        stencil[-1, -len(end) :] = [-weight for weight in reversed(end)]
         for k in range(1, n - 1):
             stencil[k, k - 1], stencil[k, k + 1] = -0.5, 0.5
-        rate = ca.sparsify(DM(stencil)).T * (self.grid.parts / ca.fmax(at[self.duration], LEAST_DURATION))
+        rate = ca.sparsify(DM(stencil)).T * (self.grid.parts / ca.fmax(point[self.duration], LEAST_DURATION))
         qd = q @ rate
         return qd, qd @ rate
 

@@ -59,7 +59,7 @@ def make_phase_problem(name: str, title: str, phase: Phase, *, searchable: bool 
     body, start = phase.body, phase.start
     if not body.closed_form:
         usual = [make_usual_bounds(body, variable) for variable in phase.variables]
-        start = make_start_within_reach(usual, (), lambda at: phase.sample(at, Exact()).reach, start)
+        start = make_start_within_reach(usual, (), lambda point: phase.sample(point, Exact()).reach, start)
     problem = GaitProblem(
         name=f"{body.family}-{name}",
         title=f"{body.title}, {title}",

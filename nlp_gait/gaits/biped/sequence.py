@@ -28,7 +28,7 @@ class End(NamedTuple):
     mirrored: bool = False  # the mirror image, as seen from the foot that has just landed
 
 
-class Part(NamedTuple):
+class Section(NamedTuple):
     """A phase of a longer motion over the left foot, which stands at x = 0."""
 
     name: str  # before the names of its rows and indexes
@@ -45,8 +45,8 @@ class Part(NamedTuple):
 LIFT_OFF, TOUCH_DOWN = End(0), End(1)
 CYCLE_END = End(0, mirrored=True)
 CYCLE = (
-    Part(Support.SINGLE, Support.SINGLE, LIFT_OFF, TOUCH_DOWN, (-1, 1), TIMES[Support.SINGLE]),
-    Part(Support.DOUBLE, Support.DOUBLE, TOUCH_DOWN, CYCLE_END, (1, 1), TIMES[Support.DOUBLE]),
+    Section(Support.SINGLE, Support.SINGLE, LIFT_OFF, TOUCH_DOWN, (-1, 1), TIMES[Support.SINGLE]),
+    Section(Support.DOUBLE, Support.DOUBLE, TOUCH_DOWN, CYCLE_END, (1, 1), TIMES[Support.DOUBLE]),
 )
 
 
@@ -61,10 +61,10 @@ class Switch:
     mirrored: bool = False  # the mirror image of the phase follows, as after the last one of a cycle
 
     def join(
-        self, phases: Mapping[Support, Phase], at: Point, before: Samples, after: Samples, ops: Nonsmooth
+        self, phases: Mapping[Support, Phase], point: Point, before: Samples, after: Samples, ops: Nonsmooth
     ) -> tuple[list[Constraint], dict[str, MX]]:
         """Return the rows that join two phases, here those that limit the torques' jumps, and indexes, their largest [Nm]."""
-        body, limit = phases[Support.SINGLE].body, at[TORQUE_JUMP]
+        body, limit = phases[Support.SINGLE].body, point[TORQUE_JUMP]
         images, signs = body.mirror
         first = DM(signs) * after.torque[images, 0] if self.mirrored else after.torque[:, 0]
         jump, size = first - before.torque[:, -1], body.torque_scale
@@ -72,8 +72,8 @@ class Switch:
         return [rows], {f"{self.name}_torque_jump_Nm": ca.mmax(ca.fabs(jump))}
 
 
-class AssembledParts(NamedTuple):
-    """What the parts of a motion contribute, by name."""
+class AssembledSections(NamedTuple):
+    """What the sections of a motion contribute, by name."""
 
     samples: Mapping[str, Samples]
     objectives: Mapping[str, MX]
@@ -90,15 +90,15 @@ class Sequence:
     body: Body
     variables: tuple[Variable, ...]
     phases: Mapping[Support, Phase]  # by kind
-    parts: tuple[Part, ...]  # in the order of time
+    sections: tuple[Section, ...]  # in the order of time
 
-    def read_part(self, part: Part, at: Any) -> Any:
-        """Return the point of a part's phase from that of the motion."""
-        return at
+    def read_section(self, section: Section, point: Any) -> Any:
+        """Return the point of a section's phase from that of the motion."""
+        return point
 
-    def limit_part(self, part: Part) -> Phase:
-        """Return the phase with the limits of a part."""
-        return self.phases[part.kind]
+    def limit_section(self, section: Section) -> Phase:
+        """Return the phase with the limits of a section."""
+        return self.phases[section.kind]
 
     @property
     def phase_parameters(self) -> list[Parameter]:
@@ -112,64 +112,72 @@ class Sequence:
                 unique.setdefault(parameter.name, parameter)
         return list(unique.values())
 
-    def assemble_parts(self, at: Point, ops: Nonsmooth) -> AssembledParts:
-        """Sample and assemble all parts."""
-        points = {part.name: self.read_part(part, at) for part in self.parts}
+    def assemble_sections(self, point: Point, ops: Nonsmooth) -> AssembledSections:
+        """Sample and assemble all sections."""
+        points = {section.name: self.read_section(section, point) for section in self.sections}
         samples: dict[str, Samples] = {}
         for kind in (Support.SINGLE, Support.DOUBLE):  # phases of double support differ in their limits only
-            names = [part.name for part in self.parts if (part.kind is Support.SINGLE) == (kind is Support.SINGLE)]
+            names = [
+                section.name
+                for section in self.sections
+                if (section.kind is Support.SINGLE) == (kind is Support.SINGLE)
+            ]
             several = self.phases[kind].sample_several([points[name] for name in names], ops)
             samples |= dict(zip(names, several, strict=True))
-        assembled = {p.name: self._assemble_part(p, points[p.name], samples[p.name], ops) for p in self.parts}
-        times = {p.name: ca.fmax(points[p.name][self.phases[p.kind].duration], LEAST_DURATION) for p in self.parts}
-        return AssembledParts(
+        assembled = {p.name: self._assemble_section(p, points[p.name], samples[p.name], ops) for p in self.sections}
+        times = {p.name: ca.fmax(points[p.name][self.phases[p.kind].duration], LEAST_DURATION) for p in self.sections}
+        return AssembledSections(
             samples=samples,
-            objectives={name: part.objective for name, part in assembled.items()},
+            objectives={name: section.objective for name, section in assembled.items()},
             times=times,
-            energies={name: part.indexes[f"{name}_power_W"] * times[name] for name, part in assembled.items()},
-            rows=tuple(row for part in assembled.values() for row in part.constraints),
-            indexes={key: value for part in assembled.values() for key, value in part.indexes.items()},
+            energies={name: section.indexes[f"{name}_power_W"] * times[name] for name, section in assembled.items()},
+            rows=tuple(row for section in assembled.values() for row in section.constraints),
+            indexes={key: value for section in assembled.values() for key, value in section.indexes.items()},
         )
 
-    def _assemble_part(self, part: Part, at: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
-        """Assemble one part at its own point, with its name before those of its rows and indexes."""
-        limits = {limit: at.positions[f"{part.kind}_{limit}"] for limit in BALANCE}  # a phase knows their plain names
-        assembly = self.limit_part(part).assemble(replace(at, positions={**at.positions, **limits}), ops, samples)
+    def _assemble_section(self, section: Section, point: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
+        """Assemble one section at its own point, with its name before those of its rows and indexes."""
+        limits = {
+            limit: point.positions[f"{section.kind}_{limit}"] for limit in BALANCE
+        }  # a phase knows their plain names
+        assembly = self.limit_section(section).assemble(
+            replace(point, positions={**point.positions, **limits}), ops, samples
+        )
         return Assembly(
             objective=assembly.objective,
-            constraints=tuple(replace(row, name=f"{part.name}_{row.name}") for row in assembly.constraints),
-            indexes={f"{part.name}_{key}": value for key, value in assembly.indexes.items()},
+            constraints=tuple(replace(row, name=f"{section.name}_{row.name}") for row in assembly.constraints),
+            indexes={f"{section.name}_{key}": value for key, value in assembly.indexes.items()},
         )
 
     @property
     def rows_over_time(self) -> tuple[RowsOverTime, ...]:
-        """Each part as functions of time, where it occurs first."""
+        """Each section as functions of time, where it occurs first."""
 
-        def assemble(part: Part, at: Point, instants: MX, ops: Nonsmooth) -> Assembly:
-            point = self.read_part(part, at)
-            return self._assemble_part(part, point, self.phases[part.kind].sample(point, ops, instants), ops)
+        def assemble(section: Section, whole: Point, instants: MX, ops: Nonsmooth) -> Assembly:
+            point = self.read_section(section, whole)
+            return self._assemble_section(section, point, self.phases[section.kind].sample(point, ops, instants), ops)
 
         over_time: list[RowsOverTime] = []
         begins: tuple[str, ...] = ()
-        for part in self.parts:
-            phase = replace(self.phases[part.kind], duration=part.duration)
-            for rows in phase.rows_over_time(part.name, begins) if part.occurs else ():
-                means = tuple(f"{part.name}_{index}" for index in rows.means)
-                over_time.append(replace(rows, assemble=partial(assemble, part), means=means))
-            begins = (*begins, *[part.duration] * part.occurs)
+        for section in self.sections:
+            phase = replace(self.phases[section.kind], duration=section.duration)
+            for rows in phase.rows_over_time(section.name, begins) if section.occurs else ():
+                means = tuple(f"{section.name}_{index}" for index in rows.means)
+                over_time.append(replace(rows, assemble=partial(assemble, section), means=means))
+            begins = (*begins, *[section.duration] * section.occurs)
         return tuple(over_time)
 
-    def list_step_signals(self, at: Any) -> list[Signals]:
+    def list_step_signals(self, point: Any) -> list[Signals]:
         """Return time histories of each step at a point of numbers, repeated steps as often as they occur."""
-        steps: dict[int, list[Part]] = {}
-        for part in self.parts:
-            if part.occurs:
-                steps.setdefault(part.step, []).append(part)
+        steps: dict[int, list[Section]] = {}
+        for section in self.sections:
+            if section.occurs:
+                steps.setdefault(section.step, []).append(section)
         return [
             joined
-            for parts in steps.values()
-            for joined in [join_phases(self.phases[p.kind].signals(self.read_part(p, at)) for p in parts)]
-            * parts[0].occurs
+            for sections in steps.values()
+            for joined in [join_phases(self.phases[p.kind].signals(self.read_section(p, point)) for p in sections)]
+            * sections[0].occurs
         ]
 
 
@@ -181,4 +189,4 @@ def join_phases(phases: Iterable[Signals]) -> Signals:
         begin = arrays["t"][-1][-1]
         for name, array in phase.arrays.items():
             arrays[name].append((begin + array if name == "t" else array)[1:])
-    return replace(first, arrays={name: np.concatenate(parts) for name, parts in arrays.items()})
+    return replace(first, arrays={name: np.concatenate(pieces) for name, pieces in arrays.items()})

@@ -61,7 +61,7 @@ def compute_sole_margins(foot: Foot, shares: Point2 = SOLE_SHARES) -> Point2:
 def limit_to_box(box: Box[float], margins: Margins | None = None) -> BalanceMargins:
     """Return the limit of the ZMP in the box around both soles (Fig. 8 (b)); other margins may replace the box's own."""
     return BalanceMargins(
-        margins or (lambda zmp, at, ops: compute_margins(box, zmp, ops)),
+        margins or (lambda zmp, point, ops: compute_margins(box, zmp, ops)),
         compute_mean_margins(BOX_SHARES, box.front - box.back, box.left - box.right),
     )
 
@@ -116,22 +116,22 @@ def make_support_phase(
     sharing = sharing or LoadSharing(make_single_support_loads(body))
     splines = body.make_splines(name, trajectory)
 
-    def swing(at: InstantPoint, curves_added: Mapping[str, Motion], height: float, s: SX) -> Motion:
+    def swing(point: InstantPoint, curves_added: Mapping[str, Motion], height: float, s: SX) -> Motion:
         """The paper's motion of the right foot at a height, and what its curves add."""
-        time, (begin, end) = read_duration(at, name), stance.swing_x
-        paper = swing_foot(SX(begin), SX(end), stance.swing_y, height, at[LIFT], time, s)
+        time, (begin, end) = read_duration(point, name), stance.swing_x
+        paper = swing_foot(SX(begin), SX(end), stance.swing_y, height, point[LIFT], time, s)
         curves = (curves_added["foot_x"], trajectories.constant_motion(0.0), curves_added["foot_z"])
         return trajectories.add_motions(paper, trajectories.stack(*curves))
 
-    def sole(at: InstantPoint, s: SX) -> SX:
-        return swing(at, splines.motions(at, read_duration(at, name), s), 0.0, s).position
+    def sole(point: InstantPoint, s: SX) -> SX:
+        return swing(point, splines.motions(point, read_duration(point, name), s), 0.0, s).position
 
-    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
-        time = read_duration(at, name)
-        curves = splines.motions(at, time, s)
-        hip, angles = move_hip(at, curves, *hip_places, time, s), body.angles(name, at, curves, time, s)
-        ankles = {**standing, "R": swing(at, curves, body.ankle("R")[1], s)} if swings else standing
-        return body.plan(hip, angles, ankles, at[REACH_MARGIN], ops)
+    def plan(point: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
+        time = read_duration(point, name)
+        curves = splines.motions(point, time, s)
+        hip, angles = move_hip(point, curves, *hip_places, time, s), body.angles(name, point, curves, time, s)
+        ankles = {**standing, "R": swing(point, curves, body.ankle("R")[1], s)} if swings else standing
+        return body.plan(hip, angles, ankles, point[REACH_MARGIN], ops)
 
     balance = limit_to_sole(body, stance.support_xy) if swings else limit_to_box(make_support_box(body.robot, soles))
     clearance = (SplineClearance(sole, step_m, LIFT),) if swings and splines.count else ()

@@ -40,9 +40,9 @@ from nlp_gait.gaits.biped.loads import make_divided_loads, make_single_support_l
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
-from nlp_gait.gaits.biped.sequence import CYCLE, ENERGY_PER_METRE, End, Part, Sequence
+from nlp_gait.gaits.biped.sequence import CYCLE, ENERGY_PER_METRE, End, Section, Sequence
 from nlp_gait.gaits.biped.support_phases import limit_to_box, make_support_box
-from nlp_gait.gaits.biped.walk_parts import (
+from nlp_gait.gaits.biped.walk_sections import (
     DURATION,
     GREATEST_SPEED,
     HALF_STEPS,
@@ -51,7 +51,7 @@ from nlp_gait.gaits.biped.walk_parts import (
     STAND,
     STATES,
     State,
-    list_parts,
+    list_sections,
     make_phase_variables,
     make_walk_start,
     make_walk_variables,
@@ -80,7 +80,7 @@ class WholeWalk(Sequence):
     @property
     def has_cycle(self) -> bool:
         """Whether inner steps are a cycle."""
-        return any(part.name == Support.SINGLE for part in self.parts)
+        return any(section.name == Support.SINGLE for section in self.sections)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -101,66 +101,66 @@ class WholeWalk(Sequence):
             (GREATEST_SPEED, "m/s", NO_LIMIT, "greatest speed of the inner steps (no limit by default)", 0.0, NO_LIMIT),
         )
 
-    def assemble(self, at: Point, ops: Nonsmooth) -> Assembly:
+    def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
         """Return energy per metre, rows and indexes."""
-        parts = self.assemble_parts(at, ops)
-        inner = at[STEPS] - HALF_STEPS
-        often = {part.name: inner if part.name in TIMES else 1 for part in self.parts if part.occurs}
+        sections = self.assemble_sections(point, ops)
+        inner = point[STEPS] - HALF_STEPS
+        often = {section.name: inner if section.name in TIMES else 1 for section in self.sections if section.occurs}
         energy, duration = (
             sum((values[name] * count for name, count in often.items()), MX(0))
-            for values in (parts.energies, parts.times)
+            for values in (sections.energies, sections.times)
         )
-        distance = self.find_distance(at, inner)
-        speeds, indexes = self.limit_speed(at, parts.times, parts.energies)
+        distance = self.find_distance(point, inner)
+        speeds, indexes = self.limit_speed(point, sections.times, sections.energies)
         return Assembly(
             objective=energy / distance,
-            constraints=(*parts.rows, *speeds),
+            constraints=(*sections.rows, *speeds),
             indexes={
                 "energy_J": energy,
                 "distance_m": distance,
                 "duration_s": duration,
                 "energy_J_per_m": energy / distance,
                 **indexes,
-                **parts.indexes,
+                **sections.indexes,
             },
         )
 
-    def find_distance(self, at: Point, inner: MX) -> MX:
+    def find_distance(self, point: Point, inner: MX) -> MX:
         """Return the distance that the feet advance with so many inner steps [m]."""
-        return (inner + 1) * at[STEP]
+        return (inner + 1) * point[STEP]
 
-    def limit_speed(self, at: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
+    def limit_speed(self, point: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
         """Return the row and the indexes of the inner steps."""
         if not self.has_cycle:
             return (), {}
-        time, energy = (sum((values[part.name] for part in CYCLE), MX(0)) for values in (times, energies))
-        row = make_speed_row("speed", at[STEP] / time, at[LEAST_SPEED], at[GREATEST_SPEED])
-        return (row,), {"speed_m_s": at[STEP] / time, "cycle_energy_J_per_m": energy / at[STEP]}
+        time, energy = (sum((values[section.name] for section in CYCLE), MX(0)) for values in (times, energies))
+        row = make_speed_row("speed", point[STEP] / time, point[LEAST_SPEED], point[GREATEST_SPEED])
+        return (row,), {"speed_m_s": point[STEP] / time, "cycle_energy_J_per_m": energy / point[STEP]}
 
-    def read_part(self, part: Part, at: Any) -> Any:
+    def read_section(self, section: Section, point: Any) -> Any:
         """Return the point of one phase: its own variables, see ``make_phase_variables``, from those of the walk."""
-        feet, landed = self.place_right_foot(part, at)
-        values = [value for end in (part.begin, part.end) for value in self._read_end(end, landed, at)]
-        lift = at[part.lift] if part.kind is Support.SINGLE else 0.0
-        x = ca.vertcat(*values, lift, ca.fmax(at[part.duration], LEAST_DURATION), *feet)
+        feet, landed = self.place_right_foot(section, point)
+        values = [value for end in (section.begin, section.end) for value in self._read_end(end, landed, point)]
+        lift = point[section.lift] if section.kind is Support.SINGLE else 0.0
+        x = ca.vertcat(*values, lift, ca.fmax(point[section.duration], LEAST_DURATION), *feet)
         names = self.phases[Support.SINGLE].names
-        parameters = {name: place for name, place in at.positions.items() if place[0] == "p"}
-        return replace(at, x=x, positions=parameters | {name: ("x", i) for i, name in enumerate(names)})
+        parameters = {name: place for name, place in point.positions.items() if place[0] == "p"}
+        return replace(point, x=x, positions=parameters | {name: ("x", i) for i, name in enumerate(names)})
 
-    def place_right_foot(self, part: Part, at: NumericPoint) -> tuple[list[Any], Foothold]:
-        """Return the last variables of a part's phase, and where the right foot is at its end, seen from the left one."""
-        begin, end = (share * at[STEP] for share in part.feet)
+    def place_right_foot(self, section: Section, point: NumericPoint) -> tuple[list[Any], Foothold]:
+        """Return the last variables of a section's phase, and where the right foot is at its end, seen from the left one."""
+        begin, end = (share * point[STEP] for share in section.feet)
         return [begin, end], Foothold(end, self.body.feet_y[1], 0.0)
 
-    def _read_end(self, end: End, landed: Foothold, at: NumericPoint) -> list[Any]:
+    def _read_end(self, end: End, landed: Foothold, point: NumericPoint) -> list[Any]:
         """Values of a state in the order of ``make_state_variables``, seen from the standing foot."""
         coordinates, left_y = self.body.coordinates, self.body.feet_y[0]
         if end.state is None:  # between both feet, in the mean of their directions
-            symmetric = [at[f"{c.name}_{STAND}_rad"] if c.image > 0 else 0 for c in coordinates]
-            ahead = landed._replace(yaw=landed.yaw / 2).turn(at[f"hip_x_{STAND}_m"], 0.0)
-            place = [middle / 2 + part for middle, part in zip((landed.x, landed.y + left_y), ahead, strict=True)]
-            return [*place, at[f"hip_z_{STAND}_m"], 0, 0, 0, *(v for angle in symmetric for v in (angle, 0))]
-        x, y, z, vx, vy, vz, *angles = (at[v.name] for v in self.states[end.state].make_variables(self.body))
+            symmetric = [point[f"{c.name}_{STAND}_rad"] if c.image > 0 else 0 for c in coordinates]
+            ahead = landed._replace(yaw=landed.yaw / 2).turn(point[f"hip_x_{STAND}_m"], 0.0)
+            place = [middle / 2 + offset for middle, offset in zip((landed.x, landed.y + left_y), ahead, strict=True)]
+            return [*place, point[f"hip_z_{STAND}_m"], 0, 0, 0, *(v for angle in symmetric for v in (angle, 0))]
+        x, y, z, vx, vy, vz, *angles = (point[v.name] for v in self.states[end.state].make_variables(self.body))
         if not end.mirrored:
             return [x, y, z, vx, vy, vz, *angles]
         images = [c.image for c in coordinates for _ in range(2)]
@@ -168,13 +168,13 @@ class WholeWalk(Sequence):
         mirrored = (image * angle for image, angle in zip(images, angles, strict=True))
         return [landed.x + place_x, landed.y + place_y, z + self.rise_m, *velocity, vz, *mirrored]
 
-    def place_steps(self, at: NumericPoint) -> Array:
+    def place_steps(self, point: NumericPoint) -> Array:
         """Return the places (K, 4) of the standing feet: x, y, z [m] and yaw [rad]."""
-        return np.outer(range(self.steps), [float(at[STEP]), 0.0, self.rise_m, 0.0])
+        return np.outer(range(self.steps), [float(point[STEP]), 0.0, self.rise_m, 0.0])
 
-    def signals(self, at: NumericPoint) -> Signals:
+    def signals(self, point: NumericPoint) -> Signals:
         """Return time histories of the whole walk at a point of numbers."""
-        return join_steps(self.list_step_signals(at), self.body.robot, self.place_steps(at))
+        return join_steps(self.list_step_signals(point), self.body.robot, self.place_steps(point))
 
 
 def make_speed_row(name: str, speed: MX, least: MX, greatest: MX) -> Constraint:
@@ -219,21 +219,23 @@ def _raise_lift(variable: Variable, body: Body, flight: Flight) -> Variable:
 def plan_whole_walk(body: Body, steps: int, grid: Grid, flight: Flight | None = None) -> GaitProblem:
     """Return the problem of a whole walk of least energy per metre; for the options see ``gaits.nao``."""
 
-    def read(at: InstantPoint, swings: bool) -> PhaseMotion:
-        begin, end = (read_state(at, name, body.coordinates) for name in ("begin", "end"))
-        return PhaseMotion(begin, end, at[DURATION], at[RIGHT_FROM], at[STEP], at[LIFT] if swings else None)
+    def read(point: InstantPoint, swings: bool) -> PhaseMotion:
+        begin, end = (read_state(point, name, body.coordinates) for name in ("begin", "end"))
+        return PhaseMotion(begin, end, point[DURATION], point[RIGHT_FROM], point[STEP], point[LIFT] if swings else None)
 
     steps = check_count("steps", steps, at_least=HALF_STEPS, at_most=MOST_STEPS)
     planners = [make_planner(body, partial(read, swings=swings), flight) for swings in (False, True)]
     phases = make_walk_phases(body, make_phase_variables(body), planners, grid, make_divided_loads(body, "lever"))
     variables = make_walk_variables(body, steps)
-    walk = WholeWalk(body=body, steps=steps, variables=variables, phases=phases, parts=list_parts(steps), flight=flight)
+    walk = WholeWalk(
+        body=body, steps=steps, variables=variables, phases=phases, sections=list_sections(steps), flight=flight
+    )
     if flight is None:
         return make_walk_problem(walk, variables)
     flight.check_run(next(variable.upper for variable in variables if variable.name == STEP))
     variables = tuple(_raise_lift(v, body, flight) for v in variables)
     treads = flight.list_treads(steps - 1)
-    return make_walk_problem(replace(walk, variables=variables), variables, lambda at, count: treads).fix(
+    return make_walk_problem(replace(walk, variables=variables), variables, lambda point, count: treads).fix(
         **{STEP: flight.run_m}
     )
 
@@ -245,8 +247,8 @@ def make_walk_problem(
 ) -> GaitProblem:
     """Return the problem of a walk; start points are shares of the bounds of the variables ``started``."""
     body = walk.body
-    durations = tuple(part.duration for part in walk.parts for _ in range(part.occurs))
-    start = make_walk_start(body, started, walk.states, walk.parts)
+    durations = tuple(section.duration for section in walk.sections for _ in range(section.occurs))
+    start = make_walk_start(body, started, walk.states, walk.sections)
     problem = GaitProblem(
         name=f"{body.family}-walk",
         title=f"{body.title}, walk from standing to standing: least energy per metre",

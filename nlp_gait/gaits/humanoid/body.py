@@ -58,8 +58,8 @@ class Humanoid(Body):
     def angle_names(self, phase: Support) -> tuple[str, ...]:
         return LEAN
 
-    def angle_ends(self, phase: Support, at: InstantPoint) -> dict[str, tuple[SX, SX]]:
-        return {name: (at[f"{name}_start_rad"], at[f"{name}_end_rad"]) for name in LEAN}
+    def angle_ends(self, phase: Support, point: InstantPoint) -> dict[str, tuple[SX, SX]]:
+        return {name: (point[f"{name}_start_rad"], point[f"{name}_end_rad"]) for name in LEAN}
 
     def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:
         return dict(zip(LEAN, coordinates, strict=True))
@@ -84,7 +84,7 @@ class Humanoid(Body):
                 foot = angles[RIGHT_YAW] if letter == "R" else constant_motion(0.0)
                 torso = general_leg.turn_torso(torso, angles[TORSO_YAW], foot)
             motion = general_leg.leg_motion(leg, self.newton_steps[name], torso, margin, ops, held=ops.exact)
-            joints |= {joint: Motion(*(part[i] for part in motion.joints)) for i, joint in enumerate(leg.joints)}
+            joints |= {joint: Motion(*(order[i] for order in motion.joints)) for i, joint in enumerate(leg.joints)}
             reach.append(motion.reach)
             miss.append(motion.miss)
         half_roll, half_pitch = roll.position / 2, pitch.position / 2
@@ -212,7 +212,9 @@ def _can_reach(leg: Leg, pose: Array) -> bool:
     low, high = leg.limits_rad.T
     starts = np.random.default_rng(0).uniform(low, high, (REACH_STARTS, LEG_JOINT_COUNT))
     ends = (
-        least_squares(lambda at: misfit(at).full()[:, 0], start, lambda at: jacobian(at).full(), bounds=(low, high))
+        least_squares(
+            lambda point: misfit(point).full()[:, 0], start, lambda point: jacobian(point).full(), bounds=(low, high)
+        )
         for start in starts
     )
     return any(np.abs(end.fun).max() <= REACHED for end in ends)

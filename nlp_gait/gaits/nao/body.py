@@ -105,7 +105,7 @@ def parse_nao_motors(text: str, robot: Robot) -> Motors:
 class AnkleCoupling(Limit):
     """Roll of both ankles within the lines over their pitch."""
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         angles: Mapping[str, MX] = dict(zip(samples.moving, vertsplit(samples.q), strict=True))
         names = [str(k) for k in range(samples.steps + 1)]
         rows = []
@@ -125,8 +125,8 @@ def limit_ankle_roll(pitch: MX, column: int) -> MX:
     slopes = np.diff(corners[:, column]) / np.diff(corners[:, 0])
     turns = np.diff(np.concatenate([[0.0], slopes, [0.0]]))
     value = MX(corners[0, column])
-    for at, turn in zip(corners[:, 0].tolist(), turns.tolist(), strict=True):
-        value = value + turn * fmax(pitch - at, 0.0)
+    for point, turn in zip(corners[:, 0].tolist(), turns.tolist(), strict=True):
+        value = value + turn * fmax(pitch - point, 0.0)
     return value
 
 
@@ -143,7 +143,7 @@ class NaoBody(Body):
     def angle_names(self, phase: Support) -> tuple[str, ...]:
         return tuple(ARM_SWING[phase])
 
-    def angle_ends(self, phase: Support, at: InstantPoint) -> dict[str, tuple[SX, SX]]:
+    def angle_ends(self, phase: Support, point: InstantPoint) -> dict[str, tuple[SX, SX]]:
         swing = ARM_SWING[phase]
         if self.arms == "held":
             swing = {name: (sum(ends) / 2, sum(ends) / 2) for name, ends in swing.items()}
@@ -164,11 +164,11 @@ class NaoBody(Body):
         reach = []
         for side, ankle in ankles.items():
             geometry = nao_joints.measure_leg(self.robot, side)
-            (at, *rates), (hip_at, *hip_rates) = ankle, hip
+            (point, *rates), (hip_at, *hip_rates) = ankle, hip
             moving = (a - b for a, b in zip(rates, hip_rates, strict=True))
-            hip_to_ankle = Motion(at - hip_at - DM(geometry.hip_m), *moving)
+            hip_to_ankle = Motion(point - hip_at - DM(geometry.hip_m), *moving)
             leg = leg_angles(hip_to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
-            rows = (Motion(*(part[i] for part in leg.joints)) for i in range(len(nao_joints.LEG_JOINTS)))
+            rows = (Motion(*(order[i] for order in leg.joints)) for i in range(len(nao_joints.LEG_JOINTS)))
             joints |= {f"{side}HipYawPitch": constant_motion(0.0)}
             joints |= {f"{side}{name}": row for name, row in zip(nao_joints.LEG_JOINTS, rows, strict=True)}
             reach.append(leg.reach)
@@ -193,7 +193,7 @@ class NaoBody(Body):
         """
         foot = self.robot.feet["left"]
 
-        def margins(zmp: MX, at: Point, ops: Nonsmooth) -> tuple[MX, MX]:
+        def margins(zmp: MX, point: Point, ops: Nonsmooth) -> tuple[MX, MX]:
             x, y = zmp[0, :] - support_xy[0], zmp[1, :] - support_xy[1]
             dbm_x = ops.step(x, x + foot.back_m, foot.front_m - x)
             dbm_y = ops.min((foot.left_m - y).T, (y + foot.right_m).T).T

@@ -45,7 +45,7 @@ class FreePhase(JointPhase):
     def moving(self) -> tuple[str, ...]:
         return MOVING
 
-    def move(self, at: Point, ops: Nonsmooth, phases: MX | None = None) -> MX:
+    def move(self, point: Point, ops: Nonsmooth, phases: MX | None = None) -> MX:
         n = self.grid.parts + 1 if phases is None else int(phases.shape[1])
         x, margin, s = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("s")
         joints = self.list_motions(InstantPoint.of(x, margin, self.names, [limits.REACH_MARGIN]), s, ops)
@@ -54,13 +54,13 @@ class FreePhase(JointPhase):
         motion, table = (
             tabulate_last_input(motion, DM(np.linspace(0.0, 1.0, n)).T) if phases is None else (motion, phases)
         )
-        return motion.map(n)(ca.repmat(at.x, 1, n), ca.repmat(at[limits.REACH_MARGIN], 1, n), table)
+        return motion.map(n)(ca.repmat(point.x, 1, n), ca.repmat(point[limits.REACH_MARGIN], 1, n), table)
 
-    def list_motions(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> dict[str, Motion]:
+    def list_motions(self, point: InstantPoint, phase: SX, ops: Nonsmooth) -> dict[str, Motion]:
         """Return the motions of the joints that move [rad]."""
-        duration = read_duration(at, Support.SINGLE)
-        start, end = (self.paper.plan(at, SX(instant), ops).joints for instant in (0, 1))
-        added = self.splines.motions(at, duration, phase)
+        duration = read_duration(point, Support.SINGLE)
+        start, end = (self.paper.plan(point, SX(instant), ops).joints for instant in (0, 1))
+        added = self.splines.motions(point, duration, phase)
         moved: dict[str, Motion] = {}
         for name in MOVING:
             a, b = start[name], end[name]
@@ -82,12 +82,12 @@ class FreeLimits(limits.Limit):
     def __init__(self, path_middle: float, inner_edge: float) -> None:
         self._path_middle, self._inner_edge = path_middle, inner_edge
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> limits.RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> limits.RowsAndIndexes:
         middle = samples.steps // 2  # the number of samples is odd
         along, heights, sides = samples.read("along"), samples.swing_heights, samples.read("sides")
         return (
             limits.make_rows_at_samples("foot_height", "m", heights[:, 1:-1], CORNERS, MX(0.0), first=1),
-            *limits.make_halfway_rows(along[middle], self._path_middle, heights[:, middle], at[LIFT], CORNERS),
+            *limits.make_halfway_rows(along[middle], self._path_middle, heights[:, middle], point[LIFT], CORNERS),
             limits.make_rows_at_samples(
                 "feet_apart", "m", self._inner_edge - sides[:, 1:-1], CORNERS[1::2], MX(0.0), first=1
             ),

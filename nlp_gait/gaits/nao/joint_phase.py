@@ -37,7 +37,7 @@ class JointPhase(Phase):
     plan: Planner = field(init=False)
 
     @abstractmethod
-    def move(self, at: Any, ops: Nonsmooth, phases: MX | None = None) -> Any:
+    def move(self, point: Any, ops: Nonsmooth, phases: MX | None = None) -> Any:
         """Return angles, velocities and accelerations of all curves (3 C, n) at the samples, or at other phases (1, n)."""
 
     def tie(self, values: MX, ops: Nonsmooth) -> MX:
@@ -64,16 +64,16 @@ class JointPhase(Phase):
         )
 
     def _evaluate(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[dict[str, Any]]:
-        return [self._evaluate_names(self._names_read, at, ops, phases) for at in ats]
+        return [self._evaluate_names(self._names_read, point, ops, phases) for point in ats]
 
-    def _evaluate_histories(self, at: NumericPoint) -> dict[str, Any]:
-        return self._evaluate_names(IN_TIME, at, Exact())
+    def _evaluate_histories(self, point: NumericPoint) -> dict[str, Any]:
+        return self._evaluate_names(IN_TIME, point, Exact())
 
     def _evaluate_names(
-        self, names: Sequence[str], at: Any, ops: Nonsmooth, phases: MX | None = None
+        self, names: Sequence[str], point: Any, ops: Nonsmooth, phases: MX | None = None
     ) -> dict[str, Any]:
         """Return quantities by name: of single joints from the curves, all others by one function of these."""
-        motions = self.tie(self.move(at, ops, phases), ops)
+        motions = self.tie(self.move(point, ops, phases), ops)
         n = motions.shape[1]
         q, qd, qdd = self._list_joints(motions)
         moving, joints = self.moving, self.body.joints

@@ -13,7 +13,7 @@ ARM_JOINTS = ("ShoulderPitch", "ShoulderRoll", "ElbowYaw", "ElbowRoll", "WristYa
 YAW_PITCHES = ("LHipYawPitch", "RHipYawPitch")  # one motor turns both
 # Joints that enter the power (eq. 32): both legs with the hip yaw-pitch, and both arms.
 JOINTS = tuple(
-    f"{side}{joint}" for part in (("HipYawPitch", *LEG_JOINTS), ARM_JOINTS) for side in "LR" for joint in part
+    f"{side}{joint}" for names in (("HipYawPitch", *LEG_JOINTS), ARM_JOINTS) for side in "LR" for joint in names
 )
 PLANNED_JOINTS = tuple(f"{side}{joint}" for side in "LR" for joint in LEG_JOINTS)
 KNEES = ("LKneePitch", "RKneePitch")

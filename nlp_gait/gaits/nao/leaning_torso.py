@@ -36,8 +36,8 @@ class LeaningNao(NaoBody):
     def angle_names(self, phase: Support) -> tuple[str, ...]:
         return (*super().angle_names(phase), *LEAN)
 
-    def angles(self, phase: Support, at: InstantPoint, splines: Angles, duration: SX, s: SX) -> Angles:
-        return {**super().angles(phase, at, splines, duration, s), **{name: splines[name] for name in LEAN}}
+    def angles(self, phase: Support, point: InstantPoint, splines: Angles, duration: SX, s: SX) -> Angles:
+        return {**super().angles(phase, point, splines, duration, s), **{name: splines[name] for name in LEAN}}
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
         places = {side: ankle.position for side, ankle in ankles.items()}
@@ -70,7 +70,7 @@ def make_leaning_nao(body: NaoBody) -> LeaningNao:
 class FlatSoles(Limit):
     """Soles that the closed chain leaves flat where Newton's method has converged."""
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         turns = samples.read("sole_turn")[:, 1:-1]
         return [make_rows_at_samples("sole_turn", "rad", turns, ("left", "right"), MX(-FLAT), MX(FLAT), first=1)], {}
 
@@ -109,7 +109,7 @@ def solve_leaning_legs(
     reach: list[SX] = []
     for side, hip in zip("LR", sides, strict=True):
         geometry = measure_leg(robot, side)
-        to_ankle = add_motions(Motion(ankles[side], SX(3, 1), SX(3, 1)), Motion(*(-part[:3] for part in hip)))
+        to_ankle = add_motions(Motion(ankles[side], SX(3, 1), SX(3, 1)), Motion(*(-order[:3] for order in hip)))
         leg = leg_angles(to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
         _, pitch, *below = (_select_rows(leg.joints, slice(i, i + 1)) for i in range(len(LEG_JOINTS)))
         at_hip = (_select_rows(hip, slice(3, 4)), add_motions(pitch, _select_rows(hip, slice(4, 5))))
@@ -143,10 +143,10 @@ def _place_hips(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
 
 def _solve_turn(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
     """Solve for the torso's yaw and the hips' yaw-pitch (2,) with flat soles [rad], by Newton's method from zero."""
-    turn, at = SX.sym("turn", 2), SX.sym("pose", 5)
-    misfits = ca.vertcat(*(_compute_misfit(robot, side, turn, at, ankles[side]) for side in "LR"))
+    turn, point = SX.sym("turn", 2), SX.sym("pose", 5)
+    misfits = ca.vertcat(*(_compute_misfit(robot, side, turn, point, ankles[side]) for side in "LR"))
     slope = ca.jacobian(misfits, turn)
-    step = ca.Function("step", [turn, at], [turn - ca.inv_minor(slope) @ misfits])
+    step = ca.Function("step", [turn, point], [turn - ca.inv_minor(slope) @ misfits])
     solution = SX(2, 1)
     for _ in range(NEWTON_STEPS):
         solution = step(solution, pose)

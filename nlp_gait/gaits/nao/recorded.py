@@ -45,9 +45,9 @@ class RecordedPhase(JointPhase):
         turned = np.ptp(self.recorded.q, axis=0)
         return tuple(name for name, range_rad in zip(self.body.joints, turned, strict=True) if range_rad > MOVES)
 
-    def move(self, at: Any, ops: Nonsmooth, phases: MX | None = None) -> Any:
+    def move(self, point: Any, ops: Nonsmooth, phases: MX | None = None) -> Any:
         times = np.linspace(0.0, self.recorded.duration_s, self.grid.parts + 1)
-        speed = self.recorded.duration_s / ca.fmax(at[self.duration], LEAST_DURATION)
+        speed = self.recorded.duration_s / ca.fmax(point[self.duration], LEAST_DURATION)
         q, qd, qdd = (DM(self.recorded.spline(times, order).T) for order in range(3))
         return ca.vertcat(q, qd * speed, qdd * speed**2)
 
@@ -55,9 +55,9 @@ class RecordedPhase(JointPhase):
         """Return nothing: a recording says nothing about the time between its samples."""
         return ()
 
-    def signals(self, at: NumericPoint) -> Signals:
+    def signals(self, point: NumericPoint) -> Signals:
         """Return time histories at a point of numbers; a sole within the tolerance from the ground is on it."""
-        signals = super().signals(at)
+        signals = super().signals(point)
         heights = signals.arrays["right_foot"][:, 2]
         heights[np.abs(heights) < GROUND_TOLERANCE.default] = 0.0
         return signals
@@ -81,14 +81,14 @@ class HipLimits(Limit):
         unique = {v.name: v for limits in variables for v in limits.values()}
         self.parameters = make_bound_parameters(tuple(unique.values()))
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         hip, rate = samples.read("hip"), samples.read("hip_rate")
         rows = []
         for end, limits, label in zip((0, hip.shape[1] - 1), self._variables, self._labels, strict=False):
             values = {axis: hip[k, end] for k, axis in enumerate("xyz")}
             values |= {f"v{axis}": rate[k, end] for k, axis in enumerate("xyz")}
             for key, variable in limits.items():
-                low, high = at[f"{variable.name}.lower"], at[f"{variable.name}.upper"]
+                low, high = point[f"{variable.name}.lower"], point[f"{variable.name}.upper"]
                 scale = variable.upper - variable.lower  # as a bound of the variable itself
                 row = Constraint(
                     name=f"hip_{key}_{label}", unit=variable.unit, scale=scale, value=values[key], lower=low, upper=high
@@ -105,8 +105,8 @@ class SwingLimits(Limit):
         self.parameters = (GROUND_TOLERANCE, *make_bound_parameters((lift,)))
         self._inner_edge = motion.body.support[1] - motion.body.robot.feet["left"].right_m
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        heights, sides, tolerance = samples.swing_heights, samples.read("sides"), at[GROUND_TOLERANCE.name]
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        heights, sides, tolerance = samples.swing_heights, samples.read("sides"), point[GROUND_TOLERANCE.name]
         inside = range(1, samples.steps)
         # Of the whole motion, not of the samples alone.
         highest = MX(float(self._motion.right_foot(np.linspace(0.0, self._motion.duration_s, FINE))[:, 2].max()))
@@ -119,7 +119,7 @@ class SwingLimits(Limit):
             ),
             make_rows("foot_height", "m", ca.vec(heights[:, 1:-1]), -tolerance, labels=make_labels(CORNERS, inside)),
             make_rows("feet_apart", "m", apart, MX(0.0), labels=make_labels(CORNERS[1::2], inside)),
-            make_rows("swing_height", "m", highest, at[f"{lift}.lower"], at[f"{lift}.upper"]),
+            make_rows("swing_height", "m", highest, point[f"{lift}.lower"], point[f"{lift}.upper"]),
         ), {"swing_height_m": highest}
 
 
@@ -128,8 +128,12 @@ class StandingLimits(Limit):
 
     parameters = (GROUND_TOLERANCE,)
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        heights, ground, tolerance = samples.swing_heights, samples.read("right_foot")[:2, :], at[GROUND_TOLERANCE.name]
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        heights, ground, tolerance = (
+            samples.swing_heights,
+            samples.read("right_foot")[:2, :],
+            point[GROUND_TOLERANCE.name],
+        )
         n = samples.steps + 1
         drift = ground - ca.repmat(ca.sum2(ground) / n, 1, n)
         every = range(n)
@@ -270,7 +274,7 @@ def make_recorded_gait(
     if shown == "nao-cycle":
         motions = {kind: motion.cut(*span) for kind, span in phases.items()}
         build = partial(make_recorded_cycle_problem, motions, motion.repeats)
-        x = (*(part.duration_s for part in motions.values()), step)
+        x = (*(motion.duration_s for motion in motions.values()), step)
     else:
         (kind,) = phases
         build = partial(make_recorded_phase_problem, kind, motion)

@@ -197,7 +197,7 @@ def _solve_leg(ankle: Motion, hip: Motion, margin: SX, robot: PointMassBiped, op
     angles = leg_angles(hip_to_ankle, robot.thigh_m, robot.shank_m, margin, ops).joints
     # From hip roll, hip pitch, knee, ankle pitch, ankle roll, turning about x and y of the upper link's axes.
     signs = DM([1, -1, 1, -1, 1])
-    return Walk12Leg(ankle, hip, Motion(*((signs * part)[::-1] for part in angles)), SX.eye(3))
+    return Walk12Leg(ankle, hip, Motion(*((signs * order)[::-1] for order in angles)), SX.eye(3))
 
 
 def _shift_to_ankle(leg: Walk12Leg, points: Motion) -> Motion:
@@ -206,4 +206,4 @@ def _shift_to_ankle(leg: Walk12Leg, points: Motion) -> Motion:
 
 
 def _compute_ankle_angles(leg: Walk12Leg) -> Motion:
-    return Motion(*(part[:2] for part in leg.joints))
+    return Motion(*(order[:2] for order in leg.joints))

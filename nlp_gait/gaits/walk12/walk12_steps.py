@@ -63,26 +63,26 @@ def compute_steps(
         local = dict(
             zip(sample.name_out(), (np.array(v.full().T) for v in sample(*columns, phases[None, :])), strict=True)
         )
-        part = _arrange_joints(local, side, turn_rad)
-        part |= _place_in_world(local, side, ankle, heading)
-        part |= {"t": (step + phases) * step_time_s, "left_stance": np.full(intervals + 1, 0.5 + 0.5 * side)}
+        arrays_of_step = _arrange_joints(local, side, turn_rad)
+        arrays_of_step |= _place_in_world(local, side, ankle, heading)
+        arrays_of_step |= {"t": (step + phases) * step_time_s, "left_stance": np.full(intervals + 1, 0.5 + 0.5 * side)}
         first = 0 if step == 0 else 1
-        parts.append({name: array[first:] for name, array in part.items()})
-        ankle, heading = part["right_ankle" if side > 0 else "left_ankle"][-1], heading + turn_rad
-    arrays = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        parts.append({name: array[first:] for name, array in arrays_of_step.items()})
+        ankle, heading = arrays_of_step["right_ankle" if side > 0 else "left_ankle"][-1], heading + turn_rad
+    arrays = {name: np.concatenate([step_arrays[name] for step_arrays in parts]) for name in parts[0]}
     return Signals(joints=JOINTS, arrays=arrays, columns=COLUMNS_OF)
 
 
 def compute_steps_at(
-    at: NumericPoint, robot: walk12_model.PointMassBiped, *, intervals: int, zmp: walk12_model.Zmp
+    point: NumericPoint, robot: walk12_model.PointMassBiped, *, intervals: int, zmp: walk12_model.Zmp
 ) -> Signals:
     """Compute time histories at a point of the problem, see ``compute_steps``."""
     step_time_s, turn_rad, reach_margin_rad = (
-        float(at[name]) for name in ("step_time_s", "turn_rad", "reach_margin_rad")
+        float(point[name]) for name in ("step_time_s", "turn_rad", "reach_margin_rad")
     )
     return compute_steps(
         robot,
-        at.x.full().ravel(),
+        point.x.full().ravel(),
         step_time_s=step_time_s,
         turn_rad=turn_rad,
         reach_margin_rad=reach_margin_rad,

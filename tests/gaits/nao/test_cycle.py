@@ -78,7 +78,7 @@ def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
     cycle = make_walking_cycle(
         body, sharing, problem.grid, Goal(), at_given_speed=problem.options["objective"] == "power"
     )
-    at = cycle.read_part(cycle.parts[0], problem.at(x))
+    at = cycle.read_section(cycle.sections[0], problem.at(x))
     single, double = (phase.signals(at) for phase in cycle.phases.values())
     later = {**double.arrays, "t": single.arrays["t"][-1] + double.arrays["t"]}
     joined = cycle.signals(problem.at(x)).arrays["t"]

@@ -67,7 +67,7 @@ def double_support(name: str, x: Array) -> Signals:
     body = make_nao("nao-v5")
     assert problem.grid is not None
     cycle = make_walking_cycle(body, share_load(body, "free"), problem.grid, Goal(), at_given_speed=True)
-    return cycle.phases[Support.DOUBLE].signals(cycle.read_part(cycle.parts[1], problem.at(x)))
+    return cycle.phases[Support.DOUBLE].signals(cycle.read_section(cycle.sections[1], problem.at(x)))
 
 
 @pytest.mark.slow

@@ -60,7 +60,7 @@ def _make_box_of_z(problem: GaitProblem) -> Array:
     times = box[-1]
     for k in PAIRS:
         ends = [np.multiply.outer(box[j], times).ravel() for j in (k, k + 1)]
-        (a, b), (c, d) = ((part.min(), part.max()) for part in ends)
+        (a, b), (c, d) = ((values.min(), values.max()) for values in ends)
         slack = np.array([-1.0, 1.0]) * 1e-12 * max(abs(a), abs(b), abs(c), abs(d))
         box[k], box[k + 1] = np.array([a + c, b + d]) / 2 + slack, np.array([a - d, b - c]) / 2 + slack
     return box
@@ -93,7 +93,7 @@ class _Outputs:
         row, lower, upper = (np.array(column) for column in zip(*self.rows, strict=True))
         power, torque, rate, weight = (np.array(column) for column in zip(*self.terms, strict=True))
         heat, loss = (np.array(column) for column in zip(*self.heats, strict=True))
-        row, power, torque, rate, heat = (part.astype(np.int32) for part in (row, power, torque, rate, heat))
+        row, power, torque, rate, heat = (index.astype(np.int32) for index in (row, power, torque, rate, heat))
         return PowerRows(
             row=row,
             lower=lower,
@@ -129,10 +129,10 @@ def _make_form(problem: GaitProblem, robot: Robot, phase: PowerPhase) -> PowerFo
             out.add_row(changes[-1], -limit, limit)
         before = now.torques
         _add_pose_rows(out, robot, values, now)
-        for axis, at, (low, high) in zip("xy", ca.vertsplit(now.zmp), phase.sides, strict=True):
+        for axis, point, (low, high) in zip("xy", ca.vertsplit(now.zmp), phase.sides, strict=True):
             least = values[f"dbm_{axis}_min_limit_m"]
-            out.add_row(at, low + least, high - least, SCALES["m"])
-            margins[axis].append(phase.margins[axis](at))
+            out.add_row(point, low + least, high - least, SCALES["m"])
+            margins[axis].append(phase.margins[axis](point))
     means = {axis: sum(margins[axis], SX(0)) / (intervals + 1) for axis in "xy"}
     for axis, mean in means.items():
         out.add_row(mean, values[f"dbm_{axis}_mean_limit_m"], scale=SCALES["m"])

@@ -64,15 +64,15 @@ class PowerInstant:
         """Add the torques of an arm, whose pose at one phase is numbers; returns its wrench (6, 2) about the torso's origin."""
         joints, a = [self.robot.joint(f"{side}{name}") for name in ARM_JOINTS], SX.sym("a", 3)
         frames = world_frame.make_chain_frames(joints, arms, Motion(SX(3, 1), SX(3, 1), a))
-        carried, at, rows = SX(6, 2), SX(3, 1), list[SX]()
+        carried, point, rows = SX(6, 2), SX(3, 1), list[SX]()
         for joint in reversed(joints):
             frame = frames[joint.child]
-            carried = world_frame.move_wrench(carried, at - frame.origin.position) + self.link_wrench(
+            carried = world_frame.move_wrench(carried, point - frame.origin.position) + self.link_wrench(
                 joint.child, frame
             )
-            at = frame.origin.position
+            point = frame.origin.position
             rows.append((frame.axes.position @ DM(joint.axis)).T @ carried[3:, :])
-        values = _evaluate_linear(ca.vertcat(*rows, world_frame.move_wrench(carried, at)), a, acceleration)
+        values = _evaluate_linear(ca.vertcat(*rows, world_frame.move_wrench(carried, point)), a, acceleration)
         for i, joint in enumerate(reversed(joints)):
             self.torques[joint.name] = values[i, 0] + self.rate_squared * values[i, 1]
             if not arms[joint.name].velocity.is_zero():
@@ -92,15 +92,15 @@ class PowerInstant:
         return self._add_torques(*sole, joints[::-1], [*above[::-1], (SX(6, 2), hip.position)], 1)
 
     def _add_torques(
-        self, carried: SX, at: SX, joints: Sequence[LegJoint], links: Sequence[tuple[SX, SX]], direction: int
+        self, carried: SX, reference: SX, joints: Sequence[LegJoint], links: Sequence[tuple[SX, SX]], direction: int
     ) -> SX:
         """Add the torques of a chain from a wrench about a point on; returns the wrench about the last link's point."""
         for joint, (wrench, point) in zip(joints, links, strict=True):
-            moment = world_frame.move_wrench(carried, at - joint.place)[3:, :]
-            gravity, inertia = (ca.dot(joint.axis, part) for part in ca.horzsplit(moment))
+            moment = world_frame.move_wrench(carried, reference - joint.place)[3:, :]
+            gravity, inertia = (ca.dot(joint.axis, column) for column in ca.horzsplit(moment))
             self.torques[joint.name] = direction * (gravity + self.rate_squared * inertia)
-            carried = world_frame.move_wrench(carried, at - point) + wrench
-            at = point
+            carried = world_frame.move_wrench(carried, reference - point) + wrench
+            reference = point
         return carried
 
     def _split_leg(self, side: str, hip: Motion, ankle: Motion) -> tuple[list[tuple[SX, SX]], list[LegJoint]]:
@@ -199,10 +199,10 @@ def make_single_support(robot: Robot, stance: Stance, arm_swing: Mapping[str, Po
     x, y = stance.support_xy
     sides = ((x - foot.back_m, x + foot.front_m), (y - foot.right_m, y + foot.left_m))
 
-    def margin_x(at: SX) -> SX:
+    def margin_x(point: SX) -> SX:
         """Return the distance to the side beyond the ankle, see ``NaoBody.make_sole_margins``."""
         low, high = sides[0]
-        return (high - at) - ca.if_else(at - x < 0, (high - at) - (at - low), 0)
+        return (high - point) - ca.if_else(point - x < 0, (high - point) - (point - low), 0)
 
     return PowerPhase(instant, sides, {"x": margin_x, "y": _find_nearer_margin(*sides[1])})
 
@@ -215,7 +215,7 @@ def _move_hip(z: SX, along: Point2, across: Point2, phase: float) -> Motion:
 
 def _find_nearer_margin(low: float, high: float) -> Callable[[SX], SX]:
     """Return the distance to the nearer of two sides."""
-    return lambda at: (high - low) / 2 - ca.fabs(at - (low + high) / 2)
+    return lambda point: (high - low) / 2 - ca.fabs(point - (low + high) / 2)
 
 
 def _tilt(ground: Wrench, height: float) -> SX:

@@ -61,8 +61,8 @@ def make_leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, larg
         return ca.horzcat(forward, left, upward, upper, lower, out * forward - down * upward)
 
     moved = map_motion(columns, Motion(*(a - h for a, h in zip(ankle, hip, strict=True))))
-    rolled, upper, lower = (Motion(*(part[:, 3 * i : 3 * i + 3] for part in moved)) for i in range(3))
-    knee = Motion(*(h + part[:, 9] for h, part in zip(hip, moved, strict=True)))
+    rolled, upper, lower = (Motion(*(order[:, 3 * i : 3 * i + 3] for order in moved)) for i in range(3))
+    knee = Motion(*(h + order[:, 9] for h, order in zip(hip, moved, strict=True)))
     return LegFrames(Frame(rolled, hip), Frame(upper, hip), Frame(lower, knee), Frame(rolled, ankle))
 
 
@@ -86,9 +86,9 @@ def make_chain_frames(joints: Sequence[Joint], angles: Mapping[str, Motion], bas
     moved = map_motion(columns, Motion(*(ca.vertcat(*(angles[name][order] for name in names)) for order in range(3))))
     frames = {}
     for i, joint in enumerate(joints):
-        axes = Motion(*(part[:, 4 * i : 4 * i + 3] for part in moved))
+        axes = Motion(*(order[:, 4 * i : 4 * i + 3] for order in moved))
         frames[joint.child] = Frame(
-            axes, Motion(*(o + part[:, 4 * i + 3] for o, part in zip(base, moved, strict=True)))
+            axes, Motion(*(o + order[:, 4 * i + 3] for o, order in zip(base, moved, strict=True)))
         )
     return frames
 
@@ -133,7 +133,7 @@ def compute_leg_rates(
     Source:
         Derivatives of Gupta, Pratihar, Deb (2023), eqs. (5)-(14), as in ``kinematics.leg_angles``.
     """
-    (x, y, z), (xd, yd, zd), _ = (ca.vertsplit(part) for part in hip_to_ankle)
+    (x, y, z), (xd, yd, zd), _ = (ca.vertsplit(order) for order in hip_to_ankle)
     length_squared = y * y + z * z
     length = ca.sqrt(length_squared)
     lengthd = (y * yd + z * zd) / length

@@ -14,7 +14,7 @@ from nlp_gait.formulation import Array, GaitProblem, Variable
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
 from nlp_gait.gaits.biped.bounds import make_lift_variable, make_usual_bounds
 from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables, make_state_variables
-from nlp_gait.gaits.biped.sequence import CYCLE, CYCLE_END, LIFT_OFF, End, Part
+from nlp_gait.gaits.biped.sequence import CYCLE, CYCLE_END, LIFT_OFF, End, Section
 
 STAND = Support.STAND.value  # first pose, and state of its variables
 SHIFT = "shift_time_s"
@@ -51,20 +51,20 @@ START_LIFT_OFF, START_TOUCH_DOWN, STOP_TOUCH_DOWN = map(End, range(len(SWITCHES)
 
 _SINGLE, _DOUBLE = TIMES[Support.SINGLE], TIMES[Support.DOUBLE]
 START = (
-    Part(STAND, Support.STAND, End(), End(), (0, 0), SHIFT, occurs=0),
-    Part("shift", Support.STAND, End(), START_LIFT_OFF, (0, 0), SHIFT),
-    Part("start_ssp", Support.SINGLE, START_LIFT_OFF, START_TOUCH_DOWN, (0, 1), f"start_{_SINGLE}", f"start_{LIFT}"),
-    Part("start_dsp", Support.DOUBLE, START_TOUCH_DOWN, CYCLE_END, (1, 1), f"start_{_DOUBLE}"),
+    Section(STAND, Support.STAND, End(), End(), (0, 0), SHIFT, occurs=0),
+    Section("shift", Support.STAND, End(), START_LIFT_OFF, (0, 0), SHIFT),
+    Section("start_ssp", Support.SINGLE, START_LIFT_OFF, START_TOUCH_DOWN, (0, 1), f"start_{_SINGLE}", f"start_{LIFT}"),
+    Section("start_dsp", Support.DOUBLE, START_TOUCH_DOWN, CYCLE_END, (1, 1), f"start_{_DOUBLE}"),
 )
 STOP = (
-    Part("stop_ssp", Support.SINGLE, LIFT_OFF, STOP_TOUCH_DOWN, (-1, 0), f"stop_{_SINGLE}", f"stop_{LIFT}", step=3),
-    Part("stop_dsp", Support.STAND, STOP_TOUCH_DOWN, End(), (0, 0), f"stop_{_DOUBLE}", step=3),
+    Section("stop_ssp", Support.SINGLE, LIFT_OFF, STOP_TOUCH_DOWN, (-1, 0), f"stop_{_SINGLE}", f"stop_{LIFT}", step=3),
+    Section("stop_dsp", Support.STAND, STOP_TOUCH_DOWN, End(), (0, 0), f"stop_{_DOUBLE}", step=3),
 )
 
 
-def list_parts(steps: int) -> tuple[Part, ...]:
+def list_sections(steps: int) -> tuple[Section, ...]:
     """Return the phases of a walk of so many steps, whose inner ones are the same cycle; two half steps have none."""
-    inner = [part._replace(step=2, occurs=steps - HALF_STEPS) for part in CYCLE]
+    inner = [section._replace(step=2, occurs=steps - HALF_STEPS) for section in CYCLE]
     return (*START, *(inner if steps > HALF_STEPS else ()), *STOP)
 
 
@@ -90,14 +90,14 @@ def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
     for state in STATES[len(SWITCHES) :]:
         variables += state.make_variables(body)
     variables += make_pose_variables(body)
-    for part in (*START[1:], *STOP):
-        kind = Support.SINGLE if part.kind is Support.SINGLE else Support.DOUBLE
+    for section in (*START[1:], *STOP):
+        kind = Support.SINGLE if section.kind is Support.SINGLE else Support.DOUBLE
         variables.append(
-            replace(by_name[TIMES[kind]], name=part.duration, description=f"duration of the phase {part.name}")
+            replace(by_name[TIMES[kind]], name=section.duration, description=f"duration of the phase {section.name}")
         )
         if kind is Support.SINGLE:
-            words = f"{make_lift_variable(body).description}, phase {part.name}"
-            variables.append(replace(make_lift_variable(body), name=part.lift, description=words))
+            words = f"{make_lift_variable(body).description}, phase {section.name}"
+            variables.append(replace(make_lift_variable(body), name=section.lift, description=words))
     return tuple(variables)
 
 
@@ -149,15 +149,15 @@ class WalkStart:
 
 
 def make_walk_start(
-    body: Body, variables: Sequence[Variable], states: Sequence[State], parts: Sequence[Part]
+    body: Body, variables: Sequence[Variable], states: Sequence[State], sections: Sequence[Section]
 ) -> WalkStart:
     """Return the start points of a walk of these states and phases."""
     alike = {name: like for state in states for name, like in state.find_alike(body).items()}
-    for part in parts:
-        if part.duration != SHIFT:
-            alike[part.duration] = TIMES[Support.SINGLE if part.kind is Support.SINGLE else Support.DOUBLE]
-        if part.kind is Support.SINGLE:
-            alike[part.lift] = LIFT
+    for section in sections:
+        if section.duration != SHIFT:
+            alike[section.duration] = TIMES[Support.SINGLE if section.kind is Support.SINGLE else Support.DOUBLE]
+        if section.kind is Support.SINGLE:
+            alike[section.lift] = LIFT
     return WalkStart(
         variables=[make_usual_bounds(body, variable) for variable in variables],
         alike=alike,
