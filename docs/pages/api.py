@@ -25,7 +25,7 @@ DOORS = {
     "nlp_gait.simulation.measurements": ("Measurements", "average_pressure", "measure"),
     "nlp_gait.export.formats": ("FORMATS", "write_as"),
     "metaheuristics": (),
-    "metaheuristics.multi_objective": (),
+    "metaheuristics.multi_objective": ("ManyObjectives", "Snapshot", "make_front_algorithm", "minimize_many"),
     "compare": (),
     "compare.study.task": ("Handling", "ProblemSpec", "Stop", "Task"),
     "compare.study.settings": ("SolverSpec", "StudySettings", "read_settings"),
