@@ -31,7 +31,7 @@ from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
 from nlp_gait.gaits.biped.samples import Loader, Planner
-from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, TORQUE_JUMP, Section, Sequence, Switch
+from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, TORQUE_JUMP, MotionSection, Sequence, Switch
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -50,7 +50,7 @@ Landing = Literal["soft", "inelastic"]  # of the swinging foot: at rest, or an i
 class WalkingCycle(Sequence):
     """A cycle sampled over both phases; of the variables, the step length is the last one."""
 
-    sections: tuple[Section, ...] = CYCLE
+    sections: tuple[MotionSection, ...] = CYCLE
     touch_down: Switch = Switch(name="touch_down")
     at_given_speed: bool  # the step length is no decision variable but follows from the speed
 
@@ -79,7 +79,7 @@ class WalkingCycle(Sequence):
         )
         return (*(speed if self.at_given_speed else ()), *balance, *limit, *shared)
 
-    def read_section(self, section: Section, point: Any) -> Any:
+    def read_section(self, section: MotionSection, point: Any) -> Any:
         """Return the point with the step length as a variable, also if it follows from the speed."""
         if not self.at_given_speed:
             return point

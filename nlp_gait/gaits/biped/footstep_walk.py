@@ -22,7 +22,7 @@ from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, R
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Instant, Planner
-from nlp_gait.gaits.biped.sequence import End, Section
+from nlp_gait.gaits.biped.sequence import End, MotionSection
 from nlp_gait.gaits.biped.support_phases import compute_sole_margins, limit_to_sole
 from nlp_gait.gaits.biped.walk import NO_LIMIT, WholeWalk, make_speed_row, make_walk_phases, make_walk_problem
 from nlp_gait.gaits.biped.walk_sections import DURATION, SHIFT, STAND, State, make_phase_variables, make_pose_variables
@@ -73,14 +73,14 @@ class FootstepWalk(WholeWalk):
             rows.append(make_speed_row(f"step{k}_speed", speed, least, greatest))
         return rows, {}
 
-    def limit_section(self, section: Section) -> Phase:
+    def limit_section(self, section: MotionSection) -> Phase:
         """Return the phase with the limits of a section: in double support, the ZMP is limited by the hull of both soles."""
         phase = self.phases[section.kind]
         if section.kind is not Support.DOUBLE:
             return phase
         return replace_margins(phase, make_stance_margins(self.body, section.feet[1]))
 
-    def place_right_foot(self, section: Section, point: NumericPoint) -> tuple[list[Any], Foothold]:
+    def place_right_foot(self, section: MotionSection, point: NumericPoint) -> tuple[list[Any], Foothold]:
         """Return the last variables of a section's phase, ``RIGHT``, and where the right foot is at its end."""
         begin, end = section.feet
         return [*begin, *end], end
@@ -94,11 +94,11 @@ class FootstepWalk(WholeWalk):
         return np.array(places)
 
 
-def list_footstep_sections(body: Body, feet: tuple[Foothold, ...]) -> tuple[Section, ...]:
+def list_footstep_sections(body: Body, feet: tuple[Foothold, ...]) -> tuple[MotionSection, ...]:
     """Return all phases of a walk in the order of time; its states are lift-off and touch-down of each step."""
     swings = list_swings(feet[2:], body.feet_y)
     first = (swings[0][0],) * 2
-    shift = Section("shift", Support.STAND, End(), End(0), first, SHIFT)
+    shift = MotionSection("shift", Support.STAND, End(), End(0), first, SHIFT)
     sections = [shift._replace(name=STAND, end=End(), occurs=0), shift]
     for k, (lifted, landed) in enumerate(swings):
         single, double, lift = (f"step{k + 1}_{name}" for name in (*TIMES.values(), LIFT))
@@ -106,8 +106,10 @@ def list_footstep_sections(body: Body, feet: tuple[Foothold, ...]) -> tuple[Sect
         kind = Support.STAND if np.allclose(landed, first[0], atol=BESIDE) else Support.DOUBLE
         end, stance = End() if last else End(2 * k + 2, mirrored=True), (landed, landed)
         sections += [
-            Section(f"step{k + 1}_ssp", Support.SINGLE, lift_off, touch_down, (lifted, landed), single, lift, k + 1),
-            Section(f"step{k + 1}_dsp", kind, touch_down, end, stance, double, step=k + 1),
+            MotionSection(
+                f"step{k + 1}_ssp", Support.SINGLE, lift_off, touch_down, (lifted, landed), single, lift, k + 1
+            ),
+            MotionSection(f"step{k + 1}_dsp", kind, touch_down, end, stance, double, step=k + 1),
         ]
     return (*sections, sections[-1]._replace(name=STAND_AT_END, begin=End(), occurs=0))
 

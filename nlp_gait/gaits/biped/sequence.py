@@ -28,7 +28,7 @@ class End(NamedTuple):
     mirrored: bool = False  # the mirror image, as seen from the foot that has just landed
 
 
-class Section(NamedTuple):
+class MotionSection(NamedTuple):
     """A phase of a longer motion over the left foot, which stands at x = 0."""
 
     name: str  # before the names of its rows and indexes
@@ -45,8 +45,8 @@ class Section(NamedTuple):
 LIFT_OFF, TOUCH_DOWN = End(0), End(1)
 CYCLE_END = End(0, mirrored=True)
 CYCLE = (
-    Section(Support.SINGLE, Support.SINGLE, LIFT_OFF, TOUCH_DOWN, (-1, 1), TIMES[Support.SINGLE]),
-    Section(Support.DOUBLE, Support.DOUBLE, TOUCH_DOWN, CYCLE_END, (1, 1), TIMES[Support.DOUBLE]),
+    MotionSection(Support.SINGLE, Support.SINGLE, LIFT_OFF, TOUCH_DOWN, (-1, 1), TIMES[Support.SINGLE]),
+    MotionSection(Support.DOUBLE, Support.DOUBLE, TOUCH_DOWN, CYCLE_END, (1, 1), TIMES[Support.DOUBLE]),
 )
 
 
@@ -90,13 +90,13 @@ class Sequence:
     body: Body
     variables: tuple[Variable, ...]
     phases: Mapping[Support, Phase]  # by kind
-    sections: tuple[Section, ...]  # in the order of time
+    sections: tuple[MotionSection, ...]  # in the order of time
 
-    def read_section(self, section: Section, point: Any) -> Any:
+    def read_section(self, section: MotionSection, point: Any) -> Any:
         """Return the point of a section's phase from that of the motion."""
         return point
 
-    def limit_section(self, section: Section) -> Phase:
+    def limit_section(self, section: MotionSection) -> Phase:
         """Return the phase with the limits of a section."""
         return self.phases[section.kind]
 
@@ -135,7 +135,7 @@ class Sequence:
             indexes={key: value for section in assembled.values() for key, value in section.indexes.items()},
         )
 
-    def _assemble_section(self, section: Section, point: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
+    def _assemble_section(self, section: MotionSection, point: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
         """Assemble one section at its own point, with its name before those of its rows and indexes."""
         limits = {
             limit: point.positions[f"{section.kind}_{limit}"] for limit in BALANCE
@@ -153,7 +153,7 @@ class Sequence:
     def rows_over_time(self) -> tuple[RowsOverTime, ...]:
         """Each section as functions of time, where it occurs first."""
 
-        def assemble(section: Section, whole: Point, instants: MX, ops: Nonsmooth) -> Assembly:
+        def assemble(section: MotionSection, whole: Point, instants: MX, ops: Nonsmooth) -> Assembly:
             point = self.read_section(section, whole)
             return self._assemble_section(section, point, self.phases[section.kind].sample(point, ops, instants), ops)
 
@@ -169,7 +169,7 @@ class Sequence:
 
     def list_step_signals(self, point: Any) -> list[Signals]:
         """Return time histories of each step at a point of numbers, repeated steps as often as they occur."""
-        steps: dict[int, list[Section]] = {}
+        steps: dict[int, list[MotionSection]] = {}
         for section in self.sections:
             if section.occurs:
                 steps.setdefault(section.step, []).append(section)

@@ -40,7 +40,7 @@ from nlp_gait.gaits.biped.loads import make_divided_loads, make_single_support_l
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
-from nlp_gait.gaits.biped.sequence import CYCLE, ENERGY_PER_METRE, End, Section, Sequence
+from nlp_gait.gaits.biped.sequence import CYCLE, ENERGY_PER_METRE, End, MotionSection, Sequence
 from nlp_gait.gaits.biped.support_phases import limit_to_box, make_support_box
 from nlp_gait.gaits.biped.walk_sections import (
     DURATION,
@@ -137,7 +137,7 @@ class WholeWalk(Sequence):
         row = make_speed_row("speed", point[STEP] / time, point[LEAST_SPEED], point[GREATEST_SPEED])
         return (row,), {"speed_m_s": point[STEP] / time, "cycle_energy_J_per_m": energy / point[STEP]}
 
-    def read_section(self, section: Section, point: Any) -> Any:
+    def read_section(self, section: MotionSection, point: Any) -> Any:
         """Return the point of one phase: its own variables, see ``make_phase_variables``, from those of the walk."""
         feet, landed = self.place_right_foot(section, point)
         values = [value for end in (section.begin, section.end) for value in self._read_end(end, landed, point)]
@@ -147,7 +147,7 @@ class WholeWalk(Sequence):
         parameters = {name: place for name, place in point.positions.items() if place[0] == "p"}
         return replace(point, x=x, positions=parameters | {name: ("x", i) for i, name in enumerate(names)})
 
-    def place_right_foot(self, section: Section, point: NumericPoint) -> tuple[list[Any], Foothold]:
+    def place_right_foot(self, section: MotionSection, point: NumericPoint) -> tuple[list[Any], Foothold]:
         """Return the last variables of a section's phase, and where the right foot is at its end, seen from the left one."""
         begin, end = (share * point[STEP] for share in section.feet)
         return [begin, end], Foothold(end, self.body.feet_y[1], 0.0)

@@ -14,7 +14,7 @@ from nlp_gait.formulation import Array, GaitProblem, Variable
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
 from nlp_gait.gaits.biped.bounds import make_lift_variable, make_usual_bounds
 from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables, make_state_variables
-from nlp_gait.gaits.biped.sequence import CYCLE, CYCLE_END, LIFT_OFF, End, Section
+from nlp_gait.gaits.biped.sequence import CYCLE, CYCLE_END, LIFT_OFF, End, MotionSection
 
 STAND = Support.STAND.value  # first pose, and state of its variables
 SHIFT = "shift_time_s"
@@ -51,18 +51,22 @@ START_LIFT_OFF, START_TOUCH_DOWN, STOP_TOUCH_DOWN = map(End, range(len(SWITCHES)
 
 _SINGLE, _DOUBLE = TIMES[Support.SINGLE], TIMES[Support.DOUBLE]
 START = (
-    Section(STAND, Support.STAND, End(), End(), (0, 0), SHIFT, occurs=0),
-    Section("shift", Support.STAND, End(), START_LIFT_OFF, (0, 0), SHIFT),
-    Section("start_ssp", Support.SINGLE, START_LIFT_OFF, START_TOUCH_DOWN, (0, 1), f"start_{_SINGLE}", f"start_{LIFT}"),
-    Section("start_dsp", Support.DOUBLE, START_TOUCH_DOWN, CYCLE_END, (1, 1), f"start_{_DOUBLE}"),
+    MotionSection(STAND, Support.STAND, End(), End(), (0, 0), SHIFT, occurs=0),
+    MotionSection("shift", Support.STAND, End(), START_LIFT_OFF, (0, 0), SHIFT),
+    MotionSection(
+        "start_ssp", Support.SINGLE, START_LIFT_OFF, START_TOUCH_DOWN, (0, 1), f"start_{_SINGLE}", f"start_{LIFT}"
+    ),
+    MotionSection("start_dsp", Support.DOUBLE, START_TOUCH_DOWN, CYCLE_END, (1, 1), f"start_{_DOUBLE}"),
 )
 STOP = (
-    Section("stop_ssp", Support.SINGLE, LIFT_OFF, STOP_TOUCH_DOWN, (-1, 0), f"stop_{_SINGLE}", f"stop_{LIFT}", step=3),
-    Section("stop_dsp", Support.STAND, STOP_TOUCH_DOWN, End(), (0, 0), f"stop_{_DOUBLE}", step=3),
+    MotionSection(
+        "stop_ssp", Support.SINGLE, LIFT_OFF, STOP_TOUCH_DOWN, (-1, 0), f"stop_{_SINGLE}", f"stop_{LIFT}", step=3
+    ),
+    MotionSection("stop_dsp", Support.STAND, STOP_TOUCH_DOWN, End(), (0, 0), f"stop_{_DOUBLE}", step=3),
 )
 
 
-def list_sections(steps: int) -> tuple[Section, ...]:
+def list_sections(steps: int) -> tuple[MotionSection, ...]:
     """Return the phases of a walk of so many steps, whose inner ones are the same cycle; two half steps have none."""
     inner = [section._replace(step=2, occurs=steps - HALF_STEPS) for section in CYCLE]
     return (*START, *(inner if steps > HALF_STEPS else ()), *STOP)
@@ -149,7 +153,7 @@ class WalkStart:
 
 
 def make_walk_start(
-    body: Body, variables: Sequence[Variable], states: Sequence[State], sections: Sequence[Section]
+    body: Body, variables: Sequence[Variable], states: Sequence[State], sections: Sequence[MotionSection]
 ) -> WalkStart:
     """Return the start points of a walk of these states and phases."""
     alike = {name: like for state in states for name, like in state.find_alike(body).items()}
