@@ -23,8 +23,8 @@ from metaheuristics.interface import (
     Search,
     Start,
 )
-from metaheuristics.minimize import minimize
-from metaheuristics.preparation import check_limits
+from metaheuristics.minimize import EarlyStop, minimize
+from metaheuristics.preparation import check_budget
 from metaheuristics.registry import (
     ADAPTERS,
     ALGORITHMS,
@@ -45,6 +45,7 @@ __all__ = [
     "BatchObjective",
     "ConstraintHandling",
     "Deb",
+    "EarlyStop",
     "EpsilonLevel",
     "Flip",
     "GeneticAlgorithm",
@@ -63,7 +64,7 @@ __all__ = [
     "SinglePoint",
     "Start",
     "StaticPenalty",
-    "check_limits",
+    "check_budget",
     "list_installed_algorithms",
     "make_algorithm",
     "make_handling",

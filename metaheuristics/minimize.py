@@ -1,9 +1,12 @@
 """The only loop: ask, evaluate, record, tell; and the record of a run."""
 
+import math
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass, field
 from functools import cache
+from numbers import Integral
 from time import perf_counter
 
 import numpy as np
@@ -12,8 +15,18 @@ from threadpoolctl import ThreadpoolController
 
 from metaheuristics import interface, preparation
 from metaheuristics.constraint_handling import Deb
-from metaheuristics.errors import SearchError
-from metaheuristics.interface import Algorithm, Array, BatchObjective, CallingSearch, ConstraintHandling, Ended, Rule
+from metaheuristics.errors import SearchError, abbreviate
+from metaheuristics.interface import (
+    Algorithm,
+    Array,
+    BatchObjective,
+    CallingSearch,
+    ConstraintHandling,
+    Ended,
+    Rule,
+    Search,
+)
+from metaheuristics.settings import is_number
 
 # Packages whose searches and objectives use NumPy's BLAS and LAPACK alone.
 WITHOUT_SCIPY = ("metaheuristics.algorithms", "nlp_gait", "compare")
@@ -127,80 +140,63 @@ def _read_answer(answer: object, count: int) -> tuple[Array, Array]:
     return f, violation
 
 
-_DEB = Deb()
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EarlyStop:
+    """What ends a search before its budget is used; None for nothing."""
+
+    target: float | None = None  #: once a feasible point has an objective <= target
+    stagnation: int | None = None  #: after so many generations without a better best
+    time_limit_s: float | None = None  #: after the first generation that ends beyond this time [s]
+
+    def __post_init__(self) -> None:
+        if self.target is not None and (not is_number(self.target) or math.isnan(self.target)):
+            raise SearchError(f"target must be a number or None, got {abbreviate(self.target)}")
+        if self.stagnation is not None and (not is_number(self.stagnation, Integral) or self.stagnation < 1):
+            raise SearchError(
+                f"stagnation must be a whole number of generations >= 1, or None for never, got {abbreviate(self.stagnation)}"
+            )
+        if self.time_limit_s is not None and not (is_number(self.time_limit_s) and self.time_limit_s > 0.0):
+            raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {abbreviate(self.time_limit_s)}")
+
+    def list_reasons(self, record: Evaluator) -> list[str]:
+        """Return the reasons to end a run now."""
+        reached = {
+            "target reached": self.target is not None and record.best[0] == 0.0 and record.best[1] <= self.target,
+            f"no better point in {self.stagnation} generations": record.stagnation >= (self.stagnation or np.inf),
+            "time limit reached": record.elapsed_s >= (self.time_limit_s or np.inf),
+        }
+        return [reason for reason, is_reached in reached.items() if is_reached]
 
 
-def minimize(
-    objective: BatchObjective,
-    algorithm: Algorithm,
-    *,
-    evaluations: int = 10_000,
-    seed: int | np.random.SeedSequence = 0,
-    handling: ConstraintHandling = _DEB,
-    target: float | None = None,
-    stagnation: int | None = None,
-    time_limit_s: float | None = None,
-    initial: ArrayLike | None = None,
-    callback: Callback | None = None,
-) -> interface.Result:
-    """Minimise an objective within bounds and constraints.
+@dataclass(kw_only=True)
+class _Run:
+    """A search under way: its record, and why it ends."""
 
-    The starting points are uniform within the bounds and depend on the seed alone: runs of different algorithms with
-    equal seed are paired, and with different populations the first rows agree. Equal arguments give a bit-identical
-    result, unless time_limit_s ends the run.
-
-    Args:
-        objective: What to minimise; it must not depend on the order of calls.
-        algorithm: Settings of the search.
-        evaluations: Budget. It is never exceeded: of the last generation only the first rows that fit are evaluated.
-        seed: A whole number >= 0, or a SeedSequence, which is not consumed.
-        handling: How constraints enter the comparisons within the search. The best point is reported by Deb's rules
-            in any case.
-        target: Stop once a feasible point has an objective <= target.
-        stagnation: Stop after so many generations without a better best.
-        time_limit_s: Stop after the first generation that ends beyond this time [s].
-        initial: (R, n) points within the bounds that replace the first R starting points, R <= population.
-        callback: Called after each generation with X, f and violation, which it may keep but must not change; f and
-            violation are infinite where the evaluation failed.
-
-    Returns:
-        The result: there is always a best point, and the reasons for ending.
-
-    Raises:
-        SearchError: An argument is not allowed, or the objective answers with wrong shapes.
-        Interrupted: Ctrl-C after at least one generation; carries the partial result.
-    """
-    preparation.check_limits(algorithm, evaluations, target, stagnation, time_limit_s)
-    preparation.check_helpers(handling, callback)
-    sequence = preparation.seed_sequence(seed)
-    start = preparation.prepare_start(objective, algorithm.population, evaluations, sequence, initial)
-    search = algorithm.start(start)
-    if not isinstance(search, CallingSearch):
-        preparation.check_search(search, algorithm)
-    # A search that calls the objective evaluates point by point.
-    record = Evaluator(objective, callback, thinned=isinstance(search, CallingSearch))
-    reasons: list[str] = []
+    record: Evaluator
+    algorithm: Algorithm
+    evaluations: int
+    handling: ConstraintHandling
+    stop: EarlyStop
+    sequence: np.random.SeedSequence
+    reasons: list[str] = field(default_factory=list)
     initial_violation: Array | None = None
 
-    def evaluate(points: Array) -> tuple[Array, Array, Rule]:
+    def evaluate(self, points: Array) -> tuple[Array, Array, Rule]:
         """Evaluate the part of a generation that fits the budget; raise `Ended` once a limit is reached."""
-        nonlocal initial_violation
-        if reasons:  # a function ignored the first `Ended`
+        if self.reasons:  # a function ignored the first `Ended`
             raise Ended
-        f, violation = record(points[: evaluations - record.evaluations])
-        initial_violation = violation if initial_violation is None else initial_violation
-        reached = {
-            "evaluation budget used": record.evaluations >= evaluations,
-            "target reached": target is not None and record.best[0] == 0.0 and record.best[1] <= target,
-            f"no better point in {stagnation} generations": record.stagnation >= (stagnation or np.inf),
-            "time limit reached": record.elapsed_s >= (time_limit_s or np.inf),
-        }
-        reasons.extend(reason for reason, is_reached in reached.items() if is_reached)
-        if reasons:
+        f, violation = self.record(points[: self.evaluations - self.record.evaluations])
+        if self.initial_violation is None:
+            self.initial_violation = violation
+        used = ["evaluation budget used"] if self.record.evaluations >= self.evaluations else []
+        self.reasons = used + self.stop.list_reasons(self.record)
+        if self.reasons:
             raise Ended
-        return f, violation, handling.rule(record.evaluations / evaluations, initial_violation)
+        return f, violation, self.handling.rule(self.record.evaluations / self.evaluations, self.initial_violation)
 
-    def result(reasons: list[str]) -> interface.Result:
+    def conclude(self, reasons: list[str]) -> interface.Result:
+        """Return the result of a run that ended for these reasons."""
+        record = self.record
         all_failed = record.failed == record.evaluations
         record.best_x.setflags(write=False)
         return interface.Result(
@@ -214,26 +210,85 @@ def minimize(
             reasons=tuple(reasons + ["every evaluation failed"] * all_failed),
             time_s=record.elapsed_s,
             objective_time_s=record.objective_time_s,
-            algorithm=algorithm,
-            handling=handling,
-            seed_entropy=preparation.encode_entropy(sequence),
-            seed_spawn_key=tuple(sequence.spawn_key),
+            algorithm=self.algorithm,
+            handling=self.handling,
+            seed_entropy=preparation.encode_entropy(self.sequence),
+            seed_spawn_key=tuple(self.sequence.spawn_key),
         )
 
+
+def minimize(
+    objective: BatchObjective,
+    algorithm: Algorithm,
+    *,
+    evaluations: int = 10_000,
+    seed: int | np.random.SeedSequence = 0,
+    handling: ConstraintHandling | None = None,
+    stop: EarlyStop | None = None,
+    initial: ArrayLike | None = None,
+    callback: Callback | None = None,
+) -> interface.Result:
+    """Minimise an objective within bounds and constraints.
+
+    The starting points are uniform within the bounds and depend on the seed alone: runs of different algorithms with
+    equal seed are paired, and with different populations the first rows agree. Equal arguments give a bit-identical
+    result, unless a time limit ends the run.
+
+    Args:
+        objective: What to minimise; it must not depend on the order of calls.
+        algorithm: Settings of the search.
+        evaluations: Budget. It is never exceeded: of the last generation only the first rows that fit are evaluated.
+        seed: A whole number >= 0, or a SeedSequence, which is not consumed.
+        handling: How constraints enter the comparisons within the search, by default by Deb's rules, by which the best
+            point is reported in any case.
+        stop: What ends the search earlier, such as ``EarlyStop(target=0.85, time_limit_s=60.0)``.
+        initial: (R, n) points within the bounds that replace the first R starting points, R <= population.
+        callback: Called after each generation with X, f and violation, which it may keep but must not change; f and
+            violation are infinite where the evaluation failed.
+
+    Returns:
+        The result: there is always a best point, and the reasons for ending.
+
+    Raises:
+        SearchError: An argument is not allowed, or the objective answers with wrong shapes.
+        Interrupted: Ctrl-C after at least one generation; carries the partial result.
+    """
+    handling = Deb() if handling is None else handling
+    preparation.check_budget(algorithm, evaluations)
+    preparation.check_helpers(handling, callback)
+    sequence = preparation.seed_sequence(seed)
+    start = preparation.prepare_start(objective, algorithm.population, evaluations, sequence, initial)
+    search = algorithm.start(start)
+    # A search that calls the objective evaluates point by point.
+    record = Evaluator(objective, callback, thinned=isinstance(search, CallingSearch))
+    run = _Run(
+        record=record,
+        algorithm=algorithm,
+        evaluations=evaluations,
+        handling=handling,
+        stop=EarlyStop() if stop is None else stop,
+        sequence=sequence,
+    )
     try:
         with limit_blas_threads(algorithm, objective), suppress(Ended):
-            if isinstance(search, CallingSearch):
-                reason = search.run(evaluate)
-                if not record.generations:
-                    raise SearchError("the function returned without any call of f")
-                return result(reasons or [reason])
-            while True:
-                X = preparation.check_points(search.ask(), start.lower, start.upper)
-                search.tell(X, *evaluate(X))
-                if ended := preparation.check_reasons(search.stop()):
-                    return result(ended)
-        return result(reasons)
+            return run.conclude(_search(search, run, start))
+        return run.conclude(run.reasons)
     except KeyboardInterrupt as interrupt:
         if not record.generations:
             raise
-        raise interface.Interrupted(result(["interrupted"])) from interrupt
+        raise interface.Interrupted(run.conclude(["interrupted"])) from interrupt
+
+
+def _search(search: Search | CallingSearch, run: _Run, start: interface.Start) -> list[str]:
+    """Run a search to its own end; return its reasons."""
+    if isinstance(search, CallingSearch):
+        reason = search.run(run.evaluate)
+        if not run.record.generations:
+            raise SearchError("the function returned without any call of f")
+        return run.reasons or [reason]
+    preparation.check_search(search, run.algorithm)
+    while True:
+        X = preparation.check_points(search.ask(), start.lower, start.upper)
+        search.tell(X, *run.evaluate(X))
+        if reasons := preparation.check_reasons(search.stop()):
+            return reasons

@@ -1,6 +1,5 @@
 """Preparation of a run: checks of arguments, seeds, starting points."""
 
-import math
 from numbers import Integral
 from typing import Any
 
@@ -91,10 +90,8 @@ def fill_fixed(free: Array, lower: Array, upper: Array) -> Array:
     return np.clip(points, lower, upper)
 
 
-def check_limits(
-    algorithm: Algorithm, evaluations: int, target: float | None, stagnation: int | None, time_limit_s: float | None
-) -> None:
-    """Raise SearchError unless the stopping criteria of `minimize` are allowed; the budget must hold the starting points."""
+def check_budget(algorithm: Algorithm, evaluations: int) -> None:
+    """Raise SearchError unless the budget of an algorithm holds its starting points."""
     if isinstance(algorithm, type) or not (
         hasattr(algorithm, "population") and callable(getattr(algorithm, "start", None))
     ):
@@ -107,14 +104,6 @@ def check_limits(
             f"evaluations must be a whole number >= the population of {name_of(algorithm)!r}, {algorithm.population}, got "
             f"{abbreviate(evaluations)}: raise the budget or take a smaller population"
         )
-    if target is not None and (not is_number(target) or math.isnan(target)):
-        raise SearchError(f"target must be a number or None, got {abbreviate(target)}")
-    if stagnation is not None and (not is_number(stagnation, Integral) or stagnation < 1):
-        raise SearchError(
-            f"stagnation must be a whole number of generations >= 1, or None for never, got {abbreviate(stagnation)}"
-        )
-    if time_limit_s is not None and not (is_number(time_limit_s) and time_limit_s > 0.0):
-        raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {abbreviate(time_limit_s)}")
 
 
 def check_population(algorithm: Algorithm, name: str = "") -> None:

@@ -129,9 +129,7 @@ def _search(task: Task, callback: Callable[..., None] | None) -> RunRecord:
             evaluations=stop.evaluations,
             seed=task.run_seed,
             handling=make_handling(task.handling.name, **task.handling.settings),
-            target=None if stop.target is None else sign * stop.target,
-            stagnation=stop.stagnation,
-            time_limit_s=stop.time_limit_s,
+            stop=stop.end_early(sign),
             callback=callback,
         )
     history = result.history

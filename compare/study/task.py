@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from compare.study.origin import hash_installed_code
+from metaheuristics import EarlyStop
 from metaheuristics.external_program import ExternalProgram
 from metaheuristics.interface import Algorithm
-from metaheuristics.preparation import check_limits
+from metaheuristics.preparation import check_budget
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, make_algorithm, make_handling
 from metaheuristics.user_algorithm import PlainFunction, to_algorithm
 from nlp_gait.backends.identity import hash_json, identify_problem, make_key
@@ -122,6 +123,11 @@ class Stop:
     target: float | None = None  #: feasible objective that ends a search, in the problem's sense
     stagnation: int | None = None  #: generations without improvement that end a search
     time_limit_s: float | None = None  #: wall time [s]
+
+    def end_early(self, sign: float) -> EarlyStop:
+        """Return what ends a search of a problem, whose objective is minimised (sign 1) or maximised (-1), before its budget."""
+        target = None if self.target is None else sign * self.target
+        return EarlyStop(target=target, stagnation=self.stagnation, time_limit_s=self.time_limit_s)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -284,7 +290,8 @@ def check_task(task: Task) -> None:
     if task.is_search:
         make_handling(task.handling.name, **task.handling.settings)
         search = UNREAD if task.is_user_code else task.make_search()
-        check_limits(search, task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s)
+        check_budget(search, task.stop.evaluations)
+        task.stop.end_early(1.0)
     if task.start:
         if task.is_search:
             raise InputError(f"search {task.title!r} takes no start point; only NLP solvers do")

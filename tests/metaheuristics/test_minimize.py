@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from metaheuristics import AntColony, GeneticAlgorithm, Interrupted, ParticleSwarm, SearchError, minimize
+from metaheuristics import AntColony, EarlyStop, GeneticAlgorithm, Interrupted, ParticleSwarm, SearchError, minimize
 from metaheuristics.interface import Algorithm, Array
 from tests.metaheuristics.problems import Function, disc, infeasible, sphere
 
@@ -54,20 +54,22 @@ def test_the_last_generation_is_cut_to_the_budget() -> None:
 
 
 def test_target_needs_feasibility() -> None:
-    reached = minimize(disc(), SWARM, target=-1.0)
+    reached = minimize(disc(), SWARM, stop=EarlyStop(target=-1.0))
     assert reached.reasons == ("target reached",) and reached.objective <= -1.0 and reached.feasible
     assert reached.history.objective[-2] > -1.0 or reached.history.violation[-2] > 0.0
-    assert minimize(infeasible(), SWARM, evaluations=100, target=10.0).reasons == ("evaluation budget used",)
+    assert minimize(infeasible(), SWARM, evaluations=100, stop=EarlyStop(target=10.0)).reasons == (
+        "evaluation budget used",
+    )
 
 
 def test_stagnation_counts_generations_without_a_better_best() -> None:
     flat = Function(lambda X: (np.zeros(len(X)), np.zeros(len(X))), [0.0], [1.0])
-    result = minimize(flat, SWARM, stagnation=4)
+    result = minimize(flat, SWARM, stop=EarlyStop(stagnation=4))
     assert result.reasons == ("no better point in 4 generations",) and result.generations == 5
 
 
 def test_time_limit() -> None:
-    result = minimize(disc(), SWARM, time_limit_s=1e-9)
+    result = minimize(disc(), SWARM, stop=EarlyStop(time_limit_s=1e-9))
     assert result.reasons == ("time limit reached",) and result.generations == 1
 
 
@@ -145,9 +147,6 @@ def test_bad_bounds(lower: list[float], upper: list[float], message: str) -> Non
         ({"evaluations": 100.5}, "whole number"),
         ({"seed": -1}, "seed must be a whole number >= 0"),
         ({"seed": None}, "seed must be"),
-        ({"target": np.nan}, "target"),
-        ({"stagnation": 0}, "stagnation must be"),
-        ({"time_limit_s": 0.0}, "time_limit_s must be > 0"),
         ({"initial": np.zeros(2)}, r"initial: .* shape \(P, 2\).*got shape \(2,\)"),
         ({"initial": np.zeros((11, 2))}, "initial: at most 10 points"),
         ({"initial": np.full((1, 2), 9.0)}, r"initial: 9\.0 for variable 0 of point 0, outside the bounds"),
@@ -159,6 +158,12 @@ def test_bad_bounds(lower: list[float], upper: list[float], message: str) -> Non
 def test_bad_arguments(arguments: dict[str, object], message: str) -> None:
     with pytest.raises(SearchError, match=message):
         minimize(sphere(2), SWARM, **arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("criterion", [{"target": np.nan}, {"stagnation": 0}, {"time_limit_s": 0.0}])
+def test_bad_criteria(criterion: dict[str, float]) -> None:
+    with pytest.raises(SearchError, match=f"{next(iter(criterion))} must be"):
+        EarlyStop(**criterion)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
