@@ -2,6 +2,7 @@
 
 import gc
 import os
+import shutil
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -18,7 +19,6 @@ from nlp_gait.formulation import GaitProblem, registry
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.loading import is_robot_file
 from tests.compilers import hide_compilers
-from tests.extras import name_extra, skip_without_extra
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.
 settings.register_profile("reproducible", derandomize=True, deadline=None)
@@ -34,6 +34,9 @@ gc.set_threshold(100_000, 20, 100)
 # A shell ignores Ctrl-C for what it runs in the background, and so would all that the tests of it start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# Programs that pip does not install, and that tests marked `program` need.
+PROGRAMS = ("Rscript", "gjh_asl_json", "julia", "mkoctfile", "octave-cli", "pdflatex")
+
 # Folders of tests that start whole commands, studies and papers; other slow tests are marked where they stand.
 SLOW_FOLDERS = tuple(f"tests/compare/{name}/" for name in ("cli", "papers", "questions"))
 
@@ -44,43 +47,25 @@ def pytest_xdist_auto_num_workers() -> int:
     return available_cores()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what lies in these folders."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what lies in these folders, and leave out what needs a program that is not installed."""
+    without = []
     for item in items:
         if item.nodeid.startswith(SLOW_FOLDERS):
             item.add_marker(pytest.mark.slow)
+        needed = {name for mark in item.iter_markers("program") for name in mark.args}
+        assert needed <= set(PROGRAMS), item.nodeid
+        if not all(map(shutil.which, needed)):
+            without.append(item)
+    if without:
+        items[:] = [item for item in items if item not in without]
+        config.hook.pytest_deselected(items=without)
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_call() -> Iterator[None]:
-    """Skip a test that stops because a package of an extra is not installed."""
-    try:
-        return (yield)
-    except Exception as error:
-        skip_without_extra(error)
-        raise
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_fixture_setup() -> Iterator[Any]:
-    """Skip tests whose fixture stops for that reason."""
-    try:
-        return (yield)
-    except Exception as error:
-        skip_without_extra(error)
-        raise
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport() -> Iterator[Any]:
-    """Name the extra in the reason of a test that is skipped without it."""
-    return name_extra((yield))
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_make_collect_report() -> Iterator[Any]:
-    """Do so for a whole file."""
-    return name_extra((yield))
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name the programs whose tests were left out; pytest-xdist's processes do not count them."""
+    if missing := [name for name in PROGRAMS if shutil.which(name) is None]:
+        terminalreporter.write_line(f"left out, for these programs are not installed: {', '.join(missing)}")
 
 
 @contextmanager

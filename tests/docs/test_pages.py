@@ -12,7 +12,7 @@ import pytest
 from compare.cli import PANELS, load_command
 from compare.study.task import list_solvers
 from docs.check import faults_of
-from docs.pages import algorithms, api, commands, problems
+from docs.pages import algorithms, api, commands, playground, problems
 from docs.pages.gallery import ORDER
 from docs.pages.markdown import literal, table
 from nlp_gait.backends.nlp import build_nlp
@@ -135,3 +135,19 @@ def test_the_check_of_a_site_finds_what_is_wrong(tmp_path: Path) -> None:
         "a.html links to c.html, which is not there",
         "empty.html has no content",
     ]
+
+
+def test_without_a_compiler_the_page_is_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One sentence says so, in the build and on the page that leads there; an older page is removed."""
+    monkeypatch.setattr(playground, "has_compiler", lambda: False)
+    old = tmp_path / playground.FOLDER / playground.PAGE
+    old.parent.mkdir()
+    old.touch()
+    playground.write(tmp_path)
+    assert not old.exists()
+    sentence = "WebAssembly needs the package ziglang: pip install ziglang"
+    assert capsys.readouterr().out == f"the playground is left out: {sentence}\n"
+    page = (tmp_path / "playground" / "index.md").read_text(encoding="utf-8")
+    assert f"This build is without the playground: {sentence}." in page and "Open the playground" not in page

@@ -20,12 +20,13 @@ from docs.browser import (
     wait_for_motion,
 )
 from docs.pages import playground
-from docs.pages.webassembly import has_compiler
 from nlp_gait import gaitbench
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import Skeleton
-from tests.extras import describe
+from tests.extras import need, need_browser
 
+need("ziglang")
+need_browser()
 pytestmark = pytest.mark.slow
 EQUAL = 1e-9
 LARGEST_BYTES = 1_500_000
@@ -39,8 +40,6 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Path:
-    if not has_compiler():
-        pytest.skip(describe("ziglang"))
     folder = tmp_path_factory.mktemp("generated")
     playground.write(folder)
     assert "Open the playground" in (folder / "playground" / "index.md").read_text(encoding="utf-8")
@@ -205,19 +204,3 @@ def test_the_page_fits_a_phone(browser: Any, file: Path) -> None:
     with visit(browser, file, "400 dark") as found:
         wait_until(found.page, "document.body.dataset.ready === 'yes'")
         check_page(found, "400 dark")
-
-
-def test_without_a_compiler_the_page_is_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """One sentence says so, in the build and on the page that leads there; an older page is removed."""
-    monkeypatch.setattr(playground, "has_compiler", lambda: False)
-    old = tmp_path / playground.FOLDER / playground.PAGE
-    old.parent.mkdir()
-    old.touch()
-    playground.write(tmp_path)
-    assert not old.exists()
-    sentence = "WebAssembly needs the package ziglang: pip install ziglang"
-    assert capsys.readouterr().out == f"the playground is left out: {sentence}\n"
-    page = (tmp_path / "playground" / "index.md").read_text(encoding="utf-8")
-    assert f"This build is without the playground: {sentence}." in page and "Open the playground" not in page

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -78,9 +77,8 @@ def test_another_reader_and_ipopt_find_the_optimum(tmp_path: Path) -> None:
         export_nl(toy(corner), tmp_path, {})
 
 
+@pytest.mark.program(ASL)
 def test_the_ampl_solver_library_evaluates_a_gait_alike(tmp_path: Path) -> None:
-    if shutil.which(ASL) is None:
-        pytest.skip(f"{ASL} is not installed: apt-get install gjh-asl-json")
     problem: GaitProblem = load("nao-dsp", intervals=4)
     path = export_nl(problem, tmp_path, {})[0]
     subprocess.run([ASL, str(path)], check=True, capture_output=True, timeout=60)

@@ -68,7 +68,6 @@ def others(name: str) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_stairs_are_recorded(tmp_path: Path) -> None:
-    pytest.importorskip("lxml")
     problem = load("humanoid-walk", robot=crooked(tmp_path), intervals=2, **STAIRS)
     again = load("humanoid-walk", **problem.options)
     assert STAIRS.items() <= problem.options.items()

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import copy
 import pickle
 import sys
 import warnings
 from pathlib import Path
 
+import cma
 import numpy as np
 import pytest
 
@@ -28,15 +28,9 @@ def X(instance: gaitbench.Instance) -> Array:
     return np.random.default_rng(5).uniform(instance.lower, instance.upper, (40, len(instance.names)))
 
 
-def package(name: str):  # type: ignore[no-untyped-def]
-    """An optional package, which may warn while it is imported."""
-    return pytest.importorskip(name)
-
-
 @pytest.mark.parametrize("rows", [False, True])
 def test_pymoo(instance: gaitbench.Instance, X: Array, rows: bool) -> None:
     """Objective and constraints of a population; pymoo's own sum of violations is ours."""
-    package("pymoo")
     from pymoo.algorithms.soo.nonconvex.ga import GA
     from pymoo.optimize import minimize
 
@@ -55,52 +49,6 @@ def test_pymoo(instance: gaitbench.Instance, X: Array, rows: bool) -> None:
 
 
 @pytest.mark.slow
-def test_pygmo(instance: gaitbench.Instance, X: Array) -> None:
-    """Objective, rows and gradients; a copy in an archipelago's thread and a gradient solver work on it."""
-    pygmo = package("pygmo")
-    problem = instance.to("pygmo")
-    assert (problem.get_nx(), problem.get_nic(), problem.has_gradient()) == (9, len(instance.row_names), True)
-    values = np.array([problem.fitness(x) for x in X])
-    np.testing.assert_array_equal(values[:, 0], instance(X)[0])
-    np.testing.assert_array_equal(values[:, 1:], instance.rows(X))
-    np.testing.assert_array_equal(problem.batch_fitness(X.ravel()), values.ravel())
-    np.testing.assert_array_equal(problem.gradient(X[0])[:9], instance.gradient(X[0]))
-    assert problem.feasibility_x(instance.best_x)
-    assert np.allclose(copy.deepcopy(problem).fitness(X[0]), values[0])
-    population = pygmo.population(problem, 0, seed=1)
-    population.push_back(instance.best_x + 0.02 * (instance.lower + instance.upper - 2 * instance.best_x))
-    solver = pygmo.algorithm(pygmo.nlopt("slsqp"))
-    found = solver.evolve(population).champion_f[0]
-    assert found == pytest.approx(instance.best_known, rel=1e-3)
-
-
-def test_ioh(instance: gaitbench.Instance, X: Array) -> None:
-    """Bounds of each variable, the optimum, and a soft constraint that makes an infeasible point dear."""
-    package("ioh")
-    problem = instance.to("ioh")
-    np.testing.assert_array_equal(problem.bounds.lb, instance.lower)
-    np.testing.assert_array_equal(problem.bounds.ub, instance.upper)
-    assert problem.optimum.y == instance.best_known
-    np.testing.assert_array_equal(problem.optimum.x, instance.best_x)
-    assert problem(instance.best_x.tolist()) == pytest.approx(instance.best_known, rel=1e-12)
-    f, violation = instance(X)
-    for x, fi, vi in zip(X.tolist(), f, violation, strict=True):
-        expected = fi + 1e3 * abs(instance.best_known) * vi
-        assert problem(x) == pytest.approx(expected, rel=1e-12)
-    assert problem.state.evaluations == 1 + len(X)
-    assert problem.meta_data.name == f"GaitBench-{ID}" and problem.meta_data.n_variables == 9
-
-
-def test_ioh_keeps_instances_apart() -> None:
-    """Two that were wrapped one after the other: each has its own functions."""
-    package("ioh")
-    first, second = gaitbench.load("walk12-w015").to("ioh"), gaitbench.load("walk12-w100").to("ioh")
-    for problem, id in ((first, "walk12-w015"), (second, "walk12-w100")):
-        instance = gaitbench.load(id)
-        assert problem(instance.best_x.tolist()) == pytest.approx(instance.best_known, rel=1e-12)
-
-
-@pytest.mark.slow
 def test_scipy_ends_at_the_best_known(instance: gaitbench.Instance) -> None:
     """SLSQP with our gradients, from beside the best known point, in the unit cube."""
     from scipy.optimize import minimize
@@ -116,7 +64,6 @@ def test_scipy_ends_at_the_best_known(instance: gaitbench.Instance) -> None:
 def test_pycma(instance: gaitbench.Instance, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The worst row of each group; with it ``fmin_con2`` gets to a feasible point."""
     monkeypatch.chdir(tmp_path)  # pycma makes a folder there
-    cma = package("cma")
     arguments = instance.to("cma")
     constraints = arguments["constraints"](instance.best_x)
     assert 5 <= len(constraints) <= 15 and max(constraints) <= 0.0

@@ -113,10 +113,9 @@ def test_called_from_c(built: tuple[str, Path]) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.program("octave-cli", "mkoctfile")
 def test_called_from_octave(built: tuple[str, Path], tmp_path: Path) -> None:
     """Through the mex file: f, violation and G of several points, to the last digits that are printed."""
-    if not (shutil.which("octave-cli") and shutil.which("mkoctfile")):
-        pytest.skip("Octave with mkoctfile is not installed: apt-get install octave octave-dev")
     id, folder = built
     instance, prefix, X = gaitbench.load(id), make_prefix(id), points(id, 3)
     command = ["mkoctfile", "--mex", f"{prefix}_mex.cpp", f"{prefix}.cpp", "-o", f"{prefix}.mex"]

@@ -6,6 +6,7 @@ import re
 import warnings
 from collections.abc import Callable
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,10 @@ from nlp_gait.gaitbench.facts import Facts
 
 PAGE = Path(__file__).parents[2] / "docs" / "gaitbench.md"
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+IMPORT = re.compile(r"^(?:import|from) (\w+)", re.MULTILINE)
+READY = [
+    block for block in BLOCKS if all(map(find_spec, IMPORT.findall(block)))
+]  # with the extra algorithms all of them
 
 
 def _compute_by_one_start(compute: Callable[..., Facts], instance: gaitbench.Instance, starts: int) -> Facts:
@@ -26,9 +31,9 @@ def _compute_by_one_start(compute: Callable[..., Facts], instance: gaitbench.Ins
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", BLOCKS, ids=[re.sub(r"\W+", " ", block.splitlines()[0]) for block in BLOCKS])
+@pytest.mark.parametrize("block", READY, ids=[re.sub(r"\W+", " ", block.splitlines()[0]) for block in READY])
 def test_python_of_the_page_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As pasted, in an empty folder; what a package lacks is skipped by its name. A drawn instance gets one start of IPOPT."""
+    """As pasted, in an empty folder. A drawn instance gets one start of IPOPT."""
     monkeypatch.chdir(tmp_path)
     if "generate(" in block:
         monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))  # where its best known point is stored
@@ -37,8 +42,6 @@ def test_python_of_the_page_runs(block: str, tmp_path: Path, monkeypatch: pytest
     X = np.random.default_rng(0).uniform(instance.lower, instance.upper, (3, len(instance.names)))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the packages
-        for package in re.findall(r"^(?:import|from) (\w+)", block, flags=re.MULTILINE):
-            pytest.importorskip(package)
         exec(block, {"gaitbench": gaitbench, "X": X, "x": X[0]})
     assert "my-runs" not in block or (tmp_path / "my-runs").exists()  # ioh's own default is where it was imported
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -114,12 +113,14 @@ def test_the_caller_in_cpp(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "caller", ["octave-cli --quiet genetic.m", "julia random_search.jl", "Rscript random_search.R"]
+    "caller",
+    [
+        pytest.param(caller, marks=pytest.mark.program(caller.split()[0]))
+        for caller in ("octave-cli --quiet genetic.m", "julia random_search.jl", "Rscript random_search.R")
+    ],
 )
 def test_callers_in_other_languages(caller: str) -> None:
     program, *arguments = caller.split()
-    if shutil.which(program) is None:
-        pytest.skip(f"{program} is not installed")
     if (
         program == "Rscript"
         and subprocess.run([program, "-e", "library(jsonlite)"], stderr=subprocess.DEVNULL).returncode

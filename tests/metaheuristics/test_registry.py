@@ -25,8 +25,6 @@ from tests.metaheuristics.problems import disc, sphere
 
 
 def test_a_package_that_is_missing_is_named_and_left_out_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    for package in ("cma", "pymoo"):
-        pytest.importorskip(package)
     assert {"lshade", "cma", "pymoo:GA"} <= set(list_installed_algorithms())
     monkeypatch.setattr("metaheuristics.settings.find_spec", lambda name: None)
     assert "lshade" in list_installed_algorithms() and not {"cma", "pymoo:GA"} & set(list_installed_algorithms())
@@ -50,7 +48,6 @@ def test_settings_of_pymoos_own_are_passed_on() -> None:
 
 @pytest.mark.parametrize("name", MODULES)
 def test_every_pymoo_algorithm_runs_from_the_shared_points_and_leaves_the_global_generator(name: str) -> None:
-    pytest.importorskip("pymoo")
     generations: list[Array] = []
     before = np.random.get_state()[1].copy()  # type: ignore[union-attr]
     result = minimize(

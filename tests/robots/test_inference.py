@@ -21,8 +21,6 @@ from nlp_gait.robots.robot import Link
 from nlp_gait.robots.tree import find_partner, find_partners
 from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
 
-pytest.importorskip("lxml")
-
 HAND_KG = 0.1
 
 

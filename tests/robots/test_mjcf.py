@@ -6,6 +6,7 @@ import re
 from contextlib import nullcontext
 from pathlib import Path
 
+import mujoco
 import pytest
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
@@ -13,9 +14,6 @@ from nlp_gait.robots import load_robot, mjcf
 from nlp_gait.robots.biped import make_biped_model
 from tests.robots.crooked import crooked, crooked_urdf
 from tests.robots.custom import assert_same
-
-mujoco = pytest.importorskip("mujoco")
-pytest.importorskip("lxml")
 
 DIGITS = 1e-5  # MuJoCo writes six
 

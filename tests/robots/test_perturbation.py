@@ -40,7 +40,6 @@ def test_both_legs_get_longer() -> None:
 
 
 def test_the_legs_of_any_robot_get_longer(tmp_path: Path) -> None:
-    pytest.importorskip("lxml")
     robot = load_robot(str(crooked(tmp_path)))
     tall = perturb(robot, {"thigh_m": 0.01, "tibia_m": -0.005})
     for side in robot.feet:

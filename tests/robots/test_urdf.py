@@ -17,8 +17,6 @@ from nlp_gait.robots import load_robot, urdf
 from nlp_gait.robots.urdf import read_urdf
 from tests.robots.custom import about_joints, as_urdf, assert_same, humanoid, nao, partner, written
 
-pytest.importorskip("lxml")
-
 ZERO = Rotation.identity()
 SET_EULER = {"LThigh": Rotation.from_euler("xyz", (0.3, -1.1, 2.0)), "LTibia": Rotation.from_euler("x", 1.5)}
 

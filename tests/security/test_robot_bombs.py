@@ -59,7 +59,6 @@ def small_limits(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("text", BOMBS)
 def test_a_model_that_takes_too_much_is_rejected(tmp_path: Path, text: str, small_limits: None) -> None:
-    pytest.importorskip("mujoco")
     for name in ("pipe", "pipe.obj"):
         os.mkfifo(tmp_path / name)
     (tmp_path / "more.xml").write_text('<mujocoinclude><size nkey="2000000000"/></mujocoinclude>')
@@ -74,7 +73,6 @@ def test_a_model_that_takes_too_much_is_rejected(tmp_path: Path, text: str, smal
 
 @pytest.mark.slow
 def test_a_collada_file_with_many_instances_is_rejected(tmp_path: Path) -> None:
-    pytest.importorskip("lxml")
     file = tmp_path / "bomb.dae"
     file.write_text(
         '<COLLADA><library_geometries><geometry id="g"><mesh><source id="s"><float_array>'
@@ -90,7 +88,6 @@ def test_a_collada_file_with_many_instances_is_rejected(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_urdf_with_a_long_chain_is_rejected(tmp_path: Path) -> None:
-    pytest.importorskip("lxml")
     file = tmp_path / "chain.urdf"
     links = "".join(f'<link name="a{k}"/><joint name="j{k}" type="fixed"/>' for k in range(20_000))
     file.write_text(f'<robot name="r">{links}</robot>')
@@ -101,7 +98,6 @@ def test_a_urdf_with_a_long_chain_is_rejected(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("joints", [401, 900])
 def test_a_robot_with_many_joints_is_rejected(tmp_path: Path, joints: int) -> None:
-    pytest.importorskip("mujoco")
     file = tmp_path / "joints.xml"
     file.write_text(_write_model(body='<body><joint/><geom size="1"/></body>' * joints))
     with pytest.raises(RobotDataError, match=f"has {joints} turning joints, more than 400; remove"):

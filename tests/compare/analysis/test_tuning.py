@@ -1,64 +1,19 @@
-"""Settings of searches tuned on training problems, on problems with known optima."""
+"""Tuning of searches, without Optuna's part of it, which tests/test_other_packages.py runs."""
 
 from __future__ import annotations
-
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from compare.analysis.comparison import compare_problems
 from compare.analysis.record_statistics import Curve
-from compare.analysis.tuning import TRAINING_SEED, choose_training, compute_area, tune_solvers
-from compare.study.run_study import Study, run_study
+from compare.analysis.tuning import choose_training, compute_area, tune_solvers
+from compare.study.run_study import Study
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.task import ProblemSpec, Stop
+from compare.study.task import ProblemSpec
 from metaheuristics import SearchError, make_algorithm
 from metaheuristics.settings import list_ranges
 from nlp_gait.errors import InputError
 from tests.backends.toys import corner, toy
-
-optuna = pytest.importorskip("optuna")
-
-OWN = """
-import numpy as np
-
-def steps(f, lower, upper, evaluations, seed, *, length=1e-6):
-    x, rng = (lower + upper) / 2, np.random.default_rng(seed)
-    for k in range(evaluations):
-        y = x + length * (upper - lower) * rng.normal(size=len(x))
-        x = y if f(y) < f(x) else x
-
-steps.ranges = {"length": (1e-3, 0.3, "log")}
-"""
-
-
-@pytest.fixture(scope="module")
-def settings(tmp_path_factory: pytest.TempPathFactory) -> StudySettings:
-    file = tmp_path_factory.mktemp("own") / "own.py"
-    file.write_text(OWN)
-    return StudySettings(
-        problems=(ProblemSpec(name=toy(corner)),),
-        solvers=(SolverSpec(name="random"), SolverSpec(name="de"), SolverSpec(name=f"{file}:steps")),
-        stop=Stop(evaluations=200),
-    )
-
-
-@pytest.mark.slow
-def test_a_tuned_search_is_better_and_the_same_again(settings: StudySettings, tmp_path: Path) -> None:
-    said: list[str] = []
-    study = Study(tasks=settings.tasks(), folder=tmp_path)
-    tuned = tune_solvers(study, settings, 7, said.append)
-    assert [solver.label or solver.name for solver in tuned.solvers][:3] == ["random", "de", "de-tuned"]
-    assert said[0] == "random has no settings to tune" and len(tuned.solvers) == 5
-    assert tune_solvers(replace(study, folder=None), settings, 7, said.append) == tuned
-    training = StudySettings(
-        problems=settings.problems, solvers=tuned.solvers, stop=settings.stop, runs=1, seed=TRAINING_SEED
-    )
-    gaps = {s.name: s.curves[0] for s in compare_problems(run_study(Study(tasks=training.tasks())))[0].solvers}
-    for name in ("de", next(name for name in gaps if name.endswith("steps"))):
-        assert compute_area(gaps[f"{name}-tuned"], 200) > compute_area(gaps[name], 200)
 
 
 def test_training_instances_are_of_the_same_family_with_other_seeds() -> None:
@@ -70,8 +25,8 @@ def test_training_instances_are_of_the_same_family_with_other_seeds() -> None:
     ]
 
 
-def test_without_ranges_there_is_nothing_to_tune(settings: StudySettings) -> None:
-    alone = replace(settings, solvers=settings.solvers[:1])
+def test_without_ranges_there_is_nothing_to_tune() -> None:
+    alone = StudySettings(problems=(ProblemSpec(name=toy(corner)),), solvers=(SolverSpec(name="random"),))
     with pytest.raises(InputError, match="no solver of this study has settings with ranges"):
         tune_solvers(Study(tasks=alone.tasks()), alone, 3, lambda text: None)
 

@@ -25,7 +25,9 @@ from docs.browser import (
     wait_for_motion,
 )
 from tests.compare.records import DSP_X, record, study
+from tests.extras import need_browser
 
+need_browser()
 pytestmark = pytest.mark.slow
 CONVERGENCE, FINAL, RUNTIME = "#figure-walk-convergence", "#figure-walk-final", "#figure-walk-runtime"
 GAITS = "#figure-dsp-gaits"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import re
-import shutil
 import subprocess
 from pathlib import Path
 from statistics import mean, stdev
@@ -80,9 +79,8 @@ def test_figures_are_one_column_wide_with_embedded_fonts(records: list[RunRecord
 
 
 @pytest.mark.slow
+@pytest.mark.program("pdflatex")
 def test_latex_reads_it(records: list[RunRecord], tmp_path: Path) -> None:
-    if shutil.which("pdflatex") is None:
-        pytest.skip("pdflatex is not installed")
     FurtherFiles(latex=True, figures=True).write(tmp_path, compare_problems(records), EMPTY)
     (tmp_path / "page.tex").write_text(
         "\\documentclass{article}\n\\usepackage{booktabs,graphicx}\n\\begin{document}\n\\input{walk12-table}\n"

@@ -9,7 +9,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -20,8 +19,9 @@ from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.errors import InputError, WorkerError
 from tests.compare.study.test_study import contents
+from tests.extras import need
 
-pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason="distributed not installed")  # slow to import
+need("distributed")
 
 STUDY = StudySettings(
     problems=(ProblemSpec(name="walk12"),),
