@@ -61,6 +61,7 @@ PROBLEMS |= {
     "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
     "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",
     "stairs-ideal": "nlp_gait.gaits.stairs.ideal:stairs_ideal",
+    "stairs-climb": "nlp_gait.gaits.stairs.climb:stairs_climb",
     "gaitbench": "nlp_gait.gaitbench.suite_problem:gaitbench",
 }
 LIMITS |= {name: f"nlp_gait.gaits.biped.limits:{name}" for name in ("FrictionCone", "FootClearance")}

@@ -21,7 +21,7 @@ from nlp_gait.simulation.video import Frame, check_frames, check_video_path, wri
 
 if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
-    from nlp_gait.simulation.measurements import Measurements, Walk
+    from nlp_gait.simulation.measurements import ClimbMeasurements, Measurements, Walk
     from nlp_gait.simulation.simulate import Conditions, Robustness
 
 DRIVE = (
@@ -123,7 +123,7 @@ def simulate(
     from compare.report.interactive import animate_simulation
     from nlp_gait.export.formats import write_npz
     from nlp_gait.simulation.engine import load_mujoco
-    from nlp_gait.simulation.measurements import measure, measure_walk
+    from nlp_gait.simulation.measurements import measure, measure_climb, measure_walk
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
     from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, list_frames, make_skeleton
@@ -151,6 +151,9 @@ def simulate(
     if walk is not None:
         data |= {"walked_m": walk.walked_m, "planned_m": walk.planned_m, "energy_J": walk.engine_J}
         data["walk"] = walk.course()
+    climb = measure_climb(plan, trace) if plan.ground else None
+    if climb is not None:
+        data["climb"] = asdict(climb)
     if folder is not None:
         written += [folder / name for name in ("report.json", "model.xml", "simulation.npz")]
         write_json(folder / "report.json", replace_nan(data))
@@ -158,6 +161,8 @@ def simulate(
         write_npz(folder / "simulation.npz", trace.signals(plan.joints))
         written += plot_simulation(plan, trace, drive, folder / "simulation")
     parts = [*_describe(report), *(() if walk is None else [_describe_course(walk, drive.feedback is None)])]
+    if climb is not None:
+        parts.append(_describe_climb(climb))
     if not robustness:
         return Output(data=data, parts=parts, written=written)
     try:
@@ -206,6 +211,18 @@ def _describe(report: Measurements) -> Iterator[str | Rows]:
         yield f"{joint} is at its torque limit for {share:.2%} of the time"
     for joint in report.joint_limits:
         yield f"{joint} exceeds its mechanical range"
+
+
+def _describe_climb(climb: ClimbMeasurements) -> str:
+    errors, rises, planned = (
+        ", ".join(f"{1e3 * length:z.1f}" for length in lengths)
+        for lengths in (climb.landing_errors_m, climb.hip_rises_m, climb.planned_rises_m)
+    )
+    stairs = f"{climb.climbed} of {climb.stairs}" if climb.climbed < climb.stairs else f"{climb.stairs}"
+    return (
+        f"Climbs {stairs} stairs; landing errors [mm] {errors} (less than half a tread, {1e3 * climb.half_tread_m:.0f}, "
+        f"counts); the hip rises by [mm] {rises} (planned {planned})"
+    )
 
 
 def _describe_survival(survival: Robustness) -> Iterator[str]:

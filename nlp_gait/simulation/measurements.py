@@ -15,6 +15,7 @@ from nlp_gait.simulation.simulate import LEAST_LOAD, Simulation
 
 AT_LIMIT = 1.0 - 1e-9  # share of a torque limit from which a drive counts as saturated
 SHORTEST_CONTACT = 0.003  # [s]; a shorter one is ignored
+LEAST_RISE = 0.9  # of the hip in a climb, as a share of the planned rise
 MIDDLE = (0.2, 0.8)  # of the phase, undisturbed by the start from unloaded drives and by the landing
 
 
@@ -257,3 +258,46 @@ def _measure_walked_distance(simulation: Simulation, way: tuple[float, float]) -
     x, y = (middle[-1] - middle[0])[:2].tolist()
     cos, sin = (component / math.hypot(*way) for component in way) if any(way) else (1.0, 0.0)
     return cos * x + sin * y, cos * y - sin * x
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClimbMeasurements:
+    """A climb on stairs in numbers: one value for each time that a foot is planned to land, until a fall."""
+
+    stairs: int  # planned: levels on which feet land
+    climbed: int  # of these before the first landing that is half a tread or more off; all if the hip rises with them
+    half_tread_m: float
+    landing_errors_m: tuple[float, ...]  # distances from the planned footholds, in x and z
+    hip_rises_m: tuple[float, ...]  # of the torso's origin since the last landing
+    planned_rises_m: tuple[float, ...]
+
+
+def measure_climb(plan: Plan, simulation: Simulation) -> ClimbMeasurements:
+    """Compute the numbers of a simulation on stairs."""
+    feet = {side: plan.at(f"{side}_foot", simulation.t) for side in SIDES}
+    bears = {side: np.diff(plan.bears(side, simulation.t), prepend=1.0) > 0.0 for side in SIDES}
+    landings = sorted((int(k), side) for side in SIDES for k in np.flatnonzero(bears[side]))
+    instants = [k for k, _ in landings]
+    errors = [float(np.linalg.norm(simulation.feet[k, SIDES.index(side)] - feet[side][k])) for k, side in landings]
+    levels = [float(feet[side][k, 2]) for k, side in landings]
+    higher = np.diff(levels, prepend=max(float(path[0, 2]) for path in feet.values())) > ON_GROUND
+    hips = plan.at("hip", simulation.t)[:, 2], simulation.torso[:, 2]
+    planned, measured = (np.diff(hip[[0, *instants]]) for hip in hips)
+    half_tread = (plan.ground[1].edge_m - plan.ground[0].edge_m) / 2
+    good = np.cumprod([error < half_tread for error in errors])
+    risen = measured.sum() > LEAST_RISE * planned.sum()
+    return ClimbMeasurements(
+        stairs=_count_levels(plan),
+        climbed=int((higher & (good > 0)).sum()) if risen else 0,
+        half_tread_m=half_tread,
+        landing_errors_m=tuple(errors),
+        hip_rises_m=tuple(measured.tolist()),
+        planned_rises_m=tuple(planned.tolist()),
+    )
+
+
+def _count_levels(plan: Plan) -> int:
+    """Return the number of steps up of the feet that are planned."""
+    treads = np.array([0.0, *(tread.height_m for tread in plan.ground)])
+    first, last = (max(plan.at(f"{side}_foot", np.array([t]))[0, 2] for side in SIDES) for t in (0.0, plan.duration_s))
+    return int(((treads > first + ON_GROUND) & (treads < last + ON_GROUND)).sum())

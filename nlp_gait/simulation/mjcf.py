@@ -34,7 +34,7 @@ Shapes = Mapping[str, Sequence[Shape]]
 
 
 def make_plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction: float = FRICTION) -> str:
-    """Return the model of a plan's robot with position drives on its ground; only solid shapes can touch that."""
+    """Return the model of a plan's robot with position drives on its ground, which all shapes can touch."""
     robot, shapes = plan.robot, make_plan_shapes(plan, sole)
     root = Xml.fromstring(files("nlp_gait.simulation").joinpath("world.xml").read_text(encoding="utf-8"))
     _, option, default, _, assets, world, actuators = root
@@ -132,9 +132,7 @@ def _add_geometry(element: Xml.Element, shape: Shape, name: str) -> None:
         place = {"type": "sphere", "pos": _format_numbers(*shape.start)}
     else:
         place = {"type": "capsule", "fromto": _format_numbers(*shape.start, *shape.end)}
-    geometry = Xml.SubElement(element, "geom", {"name": name, **place, "size": _format_numbers(shape.radius)})
-    if not shape.solid:
-        geometry.set("conaffinity", "0")
+    Xml.SubElement(element, "geom", {"name": name, **place, "size": _format_numbers(shape.radius)})
 
 
 def _format_numbers(*values: float) -> str:

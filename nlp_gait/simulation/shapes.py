@@ -21,12 +21,11 @@ SHORTEST_LIMB = 0.02  # [m]; joints closer together than this share a centre
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capsule:
-    """Cylinder with round ends [m], or a ball if both ends are equal. If not solid, it touches nothing."""
+    """Cylinder with round ends [m], or a ball if both ends are equal."""
 
     start: Vector
     end: Vector
     radius: float
-    solid: bool = True
 
     def move(self, by: Vector) -> Self:
         """Return the shape, moved by a vector."""
@@ -51,14 +50,20 @@ Shape: TypeAlias = Capsule | Prism
 
 
 def make_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] = ()) -> dict[str, list[Shape]]:
-    """Return capsules, a ball for a head and prisms for soles by link, in link axes; welded joints' move to the parents."""
+    """Return capsules, a ball for a head and prisms for soles by link, in link axes; welded joints' move to the parents.
+
+    A limb that ends near the ground is shorter by twice its radius, so that the sole touches first.
+    """
     shapes: dict[str, list[Shape]] = {name: [] for name in robot.links}
     low = _find_low_joints(robot)
     for joint in robot.joints.values():
         radius = TRUNK_RADIUS if joint.parent == robot.root else LIMB_RADIUS
         if np.linalg.norm(joint.origin_m) >= SHORTEST_LIMB and joint.parent not in robot.soles:
-            solid = joint.name not in low
-            shapes[joint.parent].append(Capsule(start=(0.0, 0.0, 0.0), end=joint.origin_m, radius=radius, solid=solid))
+            length = float(np.linalg.norm(joint.origin_m))
+            share = max(1.0 - 2.0 * radius / length, 0.0) if joint.name in low else 1.0
+            x, y, z = joint.origin_m
+            end = (share * x, share * y, share * z)
+            shapes[joint.parent].append(Capsule(start=(0.0, 0.0, 0.0), end=end, radius=radius))
     parents = {joint.parent for joint in robot.joints.values()}
     for name, link in robot.links.items():
         if name in robot.soles:

@@ -13,16 +13,17 @@ import nlp_gait
 from compare.cli import app
 from nlp_gait.formulation import GaitProblem, Result
 
-pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco")
 pytestmark = pytest.mark.slow  # each gait is simulated
 
 from nlp_gait.simulation.drive import Drive  # noqa: E402
-from nlp_gait.simulation.measurements import Measurements, measure  # noqa: E402
-from nlp_gait.simulation.plan import Plan, make_plan  # noqa: E402
-from nlp_gait.simulation.simulate import Simulation, simulate_plan  # noqa: E402
+from nlp_gait.simulation.measurements import Measurements, measure, measure_climb  # noqa: E402
+from nlp_gait.simulation.plan import SIDES, Plan, make_plan  # noqa: E402
+from nlp_gait.simulation.simulate import Conditions, Simulation, prepare, simulate_plan  # noqa: E402
 
-# Optimum of stairs-plan for case 2, to four digits, and one of stairs-track.
-CLIMB = (0.6926, 0.0918, 0.2434, 0.0923, 0.709, 1.4, 0.5763, 0.7783, 1.3287, 0.3169, 0.2)
+# Optima of stairs-plan for case 2, shanks free and limited, and one of stairs-track.
+FREE = (0.6926, 0.0918, 0.2434, 0.0923, 0.709, 1.4, 0.5763, 0.7783, 1.3287, 0.3169, 0.2)
+LIMITED = (0.707, 0.078, 0.232, 0.08, 0.755, 1.318, 0.488, 0.71, 1.311, 0.323, 0.115)
 TRACKED = (8700.0, 10_000.0, 1.463)
 PAPERS_GAINS = (2.6474, 7.3724, 1.2055)  # Bhardwaj et al., Table IV, case 2
 
@@ -35,8 +36,28 @@ def simulate(
     return plan, trace, measure(plan, trace, Drive())
 
 
+def count_shank_contacts(plan: Plan, trace: Simulation) -> int:
+    """Return the contacts of shanks with the ground at every fifth millisecond of a simulation."""
+    model, data = prepare(plan, Conditions(), Drive(), "rectangle")
+    shanks = [model.body(f"{side} shank").id for side in SIDES]
+    contacts = 0
+    for state in trace.states[::10]:
+        data.qpos[:] = state
+        mujoco.mj_forward(model, data)
+        contacts += int(np.isin(model.geom_bodyid[data.contact.geom], shanks).sum())
+    return contacts
+
+
+@pytest.mark.parametrize(("shanks", "x", "hits"), [("free", FREE, True), ("limited", LIMITED, False)])
+def test_shanks_are_solid_and_a_plan_that_limits_them_touches_no_edge(
+    shanks: str, x: tuple[float, ...], hits: bool
+) -> None:
+    plan, trace, _ = simulate(nlp_gait.load("stairs-plan", shanks=shanks), x)
+    assert (count_shank_contacts(plan, trace) > 0) == hits
+
+
 def test_the_planned_climb_is_climbed_with_the_planned_energy() -> None:
-    plan, trace, m = simulate(nlp_gait.load("stairs-plan"), CLIMB)
+    plan, trace, m = simulate(nlp_gait.load("stairs-plan", shanks="limited"), LIMITED)
     assert not m.fallen and m.largest_tilt_deg < 2.0
     assert m.measured.mechanical_W == pytest.approx(m.predicted.mechanical_W, rel=0.05)
     assert m.pressure_middle_rms_m is not None and m.pressure_middle_rms_m < 0.004
@@ -48,6 +69,22 @@ def test_the_planned_climb_is_climbed_with_the_planned_energy() -> None:
     assert np.abs(trace.feet[:, :, 1]).max() < 1e-12  # nothing leaves the plane
     weight = plan.robot.mass_kg * plan.gravity
     assert trace.loads[-200:].sum(axis=1).mean() == pytest.approx(weight, rel=0.01)
+
+
+def test_one_optimum_climbs_four_stairs_and_ten_from_standing_to_standing() -> None:
+    problem = nlp_gait.load("stairs-climb")
+    solution = nlp_gait.solve(problem, starts=1, seed=0)
+    assert solution.converged
+    for stairs in (4, 10):
+        plan, trace, _ = simulate(nlp_gait.load("stairs-climb", stairs=stairs), tuple(solution.x.values()))
+        speeds = np.abs(np.diff(plan.signals.arrays["qd"], axis=0)).max(axis=1)
+        switch = (len(speeds) // (stairs + 1)) * np.arange(1, stairs + 1)
+        # Between two samples rates change by acceleration alone, also where steps meet.
+        assert speeds[switch].max() < 1.1 * np.delete(speeds, switch).max()
+        climb = measure_climb(plan, trace)
+        assert climb.climbed == climb.stairs == stairs and max(climb.landing_errors_m) < 0.02
+        assert climb.hip_rises_m == pytest.approx(climb.planned_rises_m, abs=0.005)
+        assert count_shank_contacts(plan, trace) == 0
 
 
 def test_tracked_steps_climb_with_stiff_gains_and_fall_with_the_papers() -> None:

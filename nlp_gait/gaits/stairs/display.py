@@ -1,7 +1,7 @@
 """Drawing and simulation of a step on the stairs: rods from the stance ankle, and for the engine a tree of rigid bodies.
 
-Both legs lie in one plane and pass through each other. A foot is a rod on the ground, ankle included; a plate above it touches
-the stairs. The leg with primes, which stands first, is the left one.
+Both legs lie in one plane and pass through each other. A foot is a rod on the ground, ankle included; a plate above it and the
+shank touch the stairs. The leg with primes, which stands first, is the left one.
 """
 
 import math
@@ -132,7 +132,7 @@ def make_skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton
     if history.shape[1] == len(biped.MOVING):
         history = np.hstack([history, signals.arrays.get("stance_foot", np.zeros((samples, 2)))])
     at = _locate_points(history, signals.arrays.get("stance_ankle", np.zeros((samples, 2))))
-    tread, rise = _measure_stair(parameters)
+    tread, rise = measure_stair(parameters)
     first, second = -SETBACK, tread - SETBACK
     edges = [(-1.6 * tread, -1), (first, -1), (first, 0), (second, 0), (second, 1), (1.8 * tread, 1)]
     ground = np.array([(x, level * rise) for x, level in edges])
@@ -167,11 +167,11 @@ def make_simulation_model(
     """Return the engine's model of a step; one that repeats ends as it began, one step up and with the legs exchanged."""
 
     def motion(at: NumericPoint, steps: int) -> Signals:
-        _, rise = _measure_stair(at)
-        return repeat_steps(_make_signals(step_motion(at), rise), make_rigid_bodies(), steps, rise_m=rise)
+        _, rise = measure_stair(at)
+        return repeat_steps(make_signals(step_motion(at), rise), make_rigid_bodies(), steps, rise_m=rise)
 
     def ground(at: NumericPoint, steps: int) -> tuple[Tread, ...]:
-        tread, rise = _measure_stair(at)
+        tread, rise = measure_stair(at)
         return tuple(Tread(edge_m=k * tread - SETBACK, height_m=(k + 1) * rise) for k in range(steps + 1))
 
     return SimulationModel(
@@ -212,7 +212,8 @@ def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, dou
     return StepMotion(t - t[0], q, qd, np.gradient(qd, t, axis=0), tau, pressure, double_support_s - t[0])
 
 
-def _make_signals(step: StepMotion, rise: float) -> Signals:
+def make_signals(step: StepMotion, rise: float) -> Signals:
+    """Return time histories of the robot's joints; the stance foot stands ``rise`` above the floor [m]."""
     at = _locate_points(step.q)
     lean = _compute_turns(step.q, 1.0)["UH"]  # from upright, forward
     still = np.zeros_like(lean)
@@ -246,7 +247,7 @@ def _compute_stance_toe_torque(load: Array, pressure: Array) -> Array:
     return np.maximum(load * (pressure - paper.sole_m) - weight, 0.0)
 
 
-def _measure_stair(at: NumericPoint | Mapping[str, float]) -> tuple[float, float]:
+def measure_stair(at: NumericPoint | Mapping[str, float]) -> tuple[float, float]:
     """Tread and rise [m]."""
     tread = float(at["stair_length_m"]) / 2
     return tread, tread * float(at["rise_run_ratio"])

@@ -99,6 +99,8 @@ class IdealStep:
     intervals: int  # N, equal parts of the step
     sole_off: int  # number of intervals with load on the rear sole
     toe_off: int  # number of intervals with load on the rear toe: the double support
+    behind: int = 1  # steps by which the rear ankle is behind and below the stance ankle at the start
+    ahead: int = 1  # steps by which it is ahead and above at the end
 
     @cached_property
     def layout(self) -> Layout:
@@ -123,34 +125,43 @@ class IdealStep:
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
         """Return objective and constraints; everything is smooth."""
         x = self.layout.split(point)
+        motion, n = self.limit_motion(x, point), self.intervals
+        torso = x["rate"][MOVING.index("UH"), 1:n]
+        rest = make_equal_rows("rest", x["rate"][:, [0, n]], MOVING, (0, n), "rad/s", 1.0)
+        still = make_equal_rows("torso_still", torso, ("UH",), range(1, n), "rad/s", 1.0)
+        objective, loads, indexes = self.load(x, point)
+        return Assembly(
+            objective=objective,
+            constraints=(*motion, rest, still, *self.place_feet(x, point), *self._clear_stair(x, point), *loads),
+            indexes=indexes,
+        )
+
+    def load(self, x: Mapping[str, MX], point: Point) -> tuple[MX, tuple[Constraint, ...], dict[str, MX]]:
+        """Return the effort, rows of forces, pressure and knees, and indexes."""
         step = point["step_time_s"] / self.intervals
-        torque, stance, pressure = self._loads(x)
+        torque, stance, pressure = self.compute_loads(x)
         effort = point["torque_weight"] * ca.sumsqr(torque)
         effort += point["acceleration_weight"] * ca.sumsqr(x["acceleration"])
         rate = DM(biped.JOINT_RATES) @ (x["rate"][:, 1:] + x["rate"][:, :-1]) / 2
-        return Assembly(
-            objective=step * effort,
-            constraints=(
-                *self._motion(x, step),
-                *self._feet(x, point),
-                stair.limit_grip("friction_toe", x["toe_force"], point["friction"]),
-                stair.limit_grip("friction_sole", x["sole_force"], point["friction"]),
-                stair.limit_grip("friction_stance", stance, point["stance_friction"]),
-                stair.limit_stance_load(point, stance),
-                stair.limit_stance_zmp(point, pressure),
-                stair.limit_knees("knee", x["angle"]),
-            ),
-            indexes={
-                "energy_J": step * ca.sum1(ca.fabs(ca.vec(torque * rate))),
-                "peak_torque_Nm": ca.norm_inf(ca.vec(torque)),
-                "torso_pitch_rad": x["angle"][MOVING.index("UH"), 0],
-            },
+        rows = (
+            stair.limit_grip("friction_toe", x["toe_force"], point["friction"]),
+            stair.limit_grip("friction_sole", x["sole_force"], point["friction"]),
+            stair.limit_grip("friction_stance", stance, point["stance_friction"]),
+            stair.limit_stance_load(point, stance),
+            stair.limit_stance_zmp(point, pressure),
+            stair.limit_knees("knee", x["angle"]),
         )
+        indexes = {
+            "energy_J": step * ca.sum1(ca.fabs(ca.vec(torque * rate))),
+            "peak_torque_Nm": ca.norm_inf(ca.vec(torque)),
+            "torso_pitch_rad": x["angle"][MOVING.index("UH"), 0],
+        }
+        return step * effort, rows, indexes
 
     def compute_signals(self, at: NumericPoint) -> Signals:
         """Return time histories; values of intervals are those of their first instants, the last instant repeats the last one."""
         values = self.layout.values(at.x.full().ravel())
-        symbolic = self._loads({name: MX(DM(value)) for name, value in values.items()})
+        symbolic = self.compute_loads({name: MX(DM(value)) for name, value in values.items()})
         intervals = [*(np.array(ca.evalf(part)) for part in symbolic), values["acceleration"]]
         torque, force, pressure, acceleration = (np.concatenate([part, part[:, -1:]], axis=1).T for part in intervals)
         return Signals(
@@ -167,8 +178,11 @@ class IdealStep:
 
     def simulate(self, at: NumericPoint) -> StepMotion:
         """Return the step on a fine grid, for the engine."""
-        values = self.layout.values(at.x.full().ravel())
-        step = float(at["step_time_s"]) / self.intervals
+        return self.refine(self.layout.values(at.x.full().ravel()), float(at["step_time_s"]))
+
+    def refine(self, values: Mapping[str, Array], duration_s: float) -> StepMotion:
+        """Return the step of the blocks' values on a fine grid."""
+        step = duration_s / self.intervals
         per_interval = math.ceil(FINE_INTERVALS / self.intervals)
         since = np.tile(np.arange(per_interval) * step / per_interval, self.intervals)
         # The last instant ends the last interval.
@@ -212,7 +226,8 @@ class IdealStep:
             }
         )
 
-    def _loads(self, x: Mapping[str, MX]) -> StanceLoads[MX]:
+    def compute_loads(self, x: Mapping[str, MX]) -> StanceLoads[MX]:
+        """Return joint torques and ground reaction in each interval."""
         n = self.intervals
         toe, sole = (ca.horzcat(x[force], MX(2, n - x[force].shape[1])) for force in ("toe_force", "sole_force"))
         at_intervals = biped.make_loads("T", "S").map(n)
@@ -228,30 +243,42 @@ class IdealStep:
         heights = [p[1] - compute_stair_height(p[0], on, stair.SETBACK, EDGE_WIDTH) for p in (toe, sole, ankle)]
         return ca.Function("places", [q, size], ca.cse([toe, sole, ankle, hip, ca.vertcat(*heights)]))
 
-    def _motion(self, x: Mapping[str, MX], step: MX) -> tuple[Constraint, ...]:
-        """Return rows of the quantised dynamics (eqs. 44, 45), rest at both ends, and a still torso."""
-        n = self.intervals
+    def limit_motion(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
+        """Return rows of the quantised dynamics (eqs. 44, 45)."""
+        n, step = self.intervals, point["step_time_s"] / self.intervals
         q, v, a = x["angle"], x["rate"], x["acceleration"]
         rates = v[:, 1:] - v[:, :n] - a * step  # (eq. 44)
         angles = q[:, 1:] - q[:, :n] - v[:, :n] * step - 0.5 * a * step**2  # (eq. 45)
         steps = range(1, n + 1)
-        torso = v[MOVING.index("UH"), 1:n]
         return (
-            _make_equal_rows("rate_continuity", rates, MOVING, steps, "rad/s", 1.0),
-            _make_equal_rows("angle_continuity", angles, MOVING, steps, "rad", 0.1),
-            _make_equal_rows("rest", v[:, [0, n]], MOVING, (0, n), "rad/s", 1.0),
-            _make_equal_rows("torso_still", torso, ("UH",), range(1, n), "rad/s", 1.0),
+            make_equal_rows("rate_continuity", rates, MOVING, steps, "rad/s", 1.0),
+            make_equal_rows("angle_continuity", angles, MOVING, steps, "rad", 0.1),
         )
 
-    def _feet(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
-        """Return rows of the swing foot's positions and of its height above the stair."""
+    def place_feet(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
+        """Return rows of the swing foot's positions."""
         n, lift = self.intervals, self.toe_off
         size = ca.vertcat(*stair.read_stair(point))
         q = x["angle"]
-        swing_toe, _, ankle, hip, heights = self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1))
+        swing_toe, _, ankle, _, _ = self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1))
         flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
-        toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(biped.load_toe_foot_biped().foot_m, 0) - size, 1, lift)
-        ends = ca.horzcat(ankle[:, 0] + size, ankle[:, n] - size)
+        rear = self.behind * size
+        toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(biped.load_toe_foot_biped().foot_m, 0) - rear, 1, lift)
+        ends = ca.horzcat(ankle[:, 0] + rear, ankle[:, n] - self.ahead * size)
+        return (
+            make_equal_rows("toe_stands", toe, AXES, range(1, lift + 1), "m", 0.01),
+            make_equal_rows(
+                "toe_flat", flat[1, 1 : self.sole_off + 1], ("ST",), range(1, self.sole_off + 1), "rad", 0.1
+            ),
+            make_equal_rows("foot_flat", flat[:, [0, n]], ("AS", "ST"), (0, n), "rad", 0.1),
+            make_equal_rows("ankle_on_step", ends, AXES, (0, n), "m", 0.01),
+        )
+
+    def _clear_stair(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
+        """Return rows of the hip's advance and of the swing foot's height above the stair."""
+        n, lift = self.intervals, self.toe_off
+        size = ca.vertcat(*stair.read_stair(point))
+        _, _, _, hip, heights = self._instant.map(n + 1)(x["angle"], ca.repmat(size, 1, n + 1))
         advance = hip[:, n] - hip[:, 0] - size
         in_support, in_swing = range(lift), range(lift + 1, n + 1)
 
@@ -259,19 +286,13 @@ class IdealStep:
             return stair.make_rows(name, heights, points, "m", 0.01, lower=point["clearance_m"], columns=instants)
 
         return (
-            _make_equal_rows("toe_stands", toe, AXES, range(1, lift + 1), "m", 0.01),
-            _make_equal_rows(
-                "toe_flat", flat[1, 1 : self.sole_off + 1], ("ST",), range(1, self.sole_off + 1), "rad", 0.1
-            ),
-            _make_equal_rows("foot_flat", flat[:, [0, n]], ("AS", "ST"), (0, n), "rad", 0.1),
-            _make_equal_rows("ankle_on_step", ends, AXES, (0, n), "m", 0.01),
-            _make_equal_rows("hip_advance", advance, AXES, (n,), "m", 0.01),
+            make_equal_rows("hip_advance", advance, AXES, (n,), "m", 0.01),
             above("clearance_in_support", heights[1:, :lift], ("sole", "ankle"), in_support),
             above("clearance_in_swing", heights[:, lift + 1 :], ("toe", "sole", "ankle"), in_swing),
         )
 
 
-def _make_equal_rows(
+def make_equal_rows(
     name: str, value: MX, of: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float
 ) -> Constraint:
     """Return rows value == 0."""

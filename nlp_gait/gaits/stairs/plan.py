@@ -29,10 +29,11 @@ from nlp_gait.gaits.stairs.plan_samples import (
     make_reach_function,
 )
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, load_toe_foot_biped
-from nlp_gait.gaits.stairs.planned_motion import PHASES, StepKind
+from nlp_gait.gaits.stairs.planned_motion import PHASES, StepKind, list_shank_edges
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Minimise = Literal["energy", "jerk"]
+Shanks = Literal["free", "limited"]
 OBJECTIVES = {
     "energy": Objective(name="energy", unit="J"),
     "jerk": Objective(name="peak_joint_jerk", unit="rad/s^3"),
@@ -82,6 +83,7 @@ def stairs_plan(
     step: StepKind = "next",
     balance: BalanceRule = "feet",
     angle_limits: bool = True,
+    shanks: Shanks = "free",
     intervals: int = 40,
 ) -> GaitProblem:
     """Return the planner of one step.
@@ -94,6 +96,7 @@ def stairs_plan(
         balance: feet, the centre of pressure below the stance foot; polygon, as printed, the ZMP of (49) in the convex hull of
             the contact points.
         angle_limits: whether angles of links and knees are limited; the paper gives no limits.
+        shanks: free, as printed, or limited: both shanks stay outside the steps.
         intervals: of the step, a quarter in each phase.
 
     Source:
@@ -105,7 +108,13 @@ def stairs_plan(
         )
     if intervals < len(PHASES) or intervals % len(PHASES):
         raise InputError(f"intervals must be a multiple of {len(PHASES)} (one part for each phase), got {intervals!r}")
-    planned = PlannedStep(per_phase=intervals // len(PHASES), kind=step, balance=balance, angle_limits=angle_limits)
+    planned = PlannedStep(
+        per_phase=intervals // len(PHASES),
+        kind=step,
+        balance=balance,
+        angle_limits=angle_limits,
+        shank_limits=shanks == "limited",
+    )
     variables = VARIABLES if balance == "feet" else stair.GOVERNING_VARIABLES
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
@@ -168,6 +177,8 @@ def _assemble_phase(step: PlannedStep, phase: int, point: Point, fractions: MX, 
     if share is not None:
         heights = step.clearances(point, ops, make_grid_at(phase, share(fractions)))
         clear = (_limit_clearance(heights, point["clearance_m"]),)
+    if step.shank_limits:
+        clear = (*clear, _limit_shanks(step.shank_gaps(point, ops, grid), step.kind))
     energy = (end - start) * ca.sum1(ca.sum2(ca.fabs(samples.power))) / fractions.shape[1]
     return Assembly(
         objective=energy, constraints=(*_make_rows_at(point, samples, step), *clear), indexes={"energy_J": energy}
@@ -176,6 +187,11 @@ def _assemble_phase(step: PlannedStep, phase: int, point: Point, fractions: MX, 
 
 def _limit_clearance(heights: MX, least: MX) -> Constraint:
     return stair.make_rows("clearance", heights, ("toe", "sole", "ankle"), "m", 0.01, lower=least)
+
+
+def _limit_shanks(gaps: MX, kind: StepKind) -> Constraint:
+    edges = (f"{'stance' if mark else 'swing'}, step {level}" for mark, level in list_shank_edges(kind))
+    return stair.make_rows("shanks", gaps, tuple(edges), "m", 0.01, lower=0.0)
 
 
 def _make_rows_at(point: Point, samples: PlanSamples, step: PlannedStep) -> tuple[Constraint, ...]:
@@ -221,6 +237,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
         constraints=(
             *_make_rows_at(point, samples, step),
             _limit_clearance(step.clearances(point, ops), least_clearance),
+            *((_limit_shanks(step.shank_gaps(point, ops), step.kind),) if step.shank_limits else ()),
             Constraint(name="phase_duration", labels=PHASES, unit="s", scale=0.1, value=durations, lower=least),
             *rest,
         ),

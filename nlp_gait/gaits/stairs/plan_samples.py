@@ -66,6 +66,7 @@ class PlannedStep:
     kind: StepKind = "next"
     balance: BalanceRule = "feet"
     angle_limits: bool = True  # whether angles of links and knees are limited
+    shank_limits: bool = False  # whether the shanks stay outside the steps
 
     @cached_property
     def grid(self) -> tuple[DM, Array]:
@@ -89,6 +90,10 @@ class PlannedStep:
     def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> MX:
         """Return heights (3, m) of toe, sole and ankle of the swing foot above the stair [m]."""
         return self._map_samples(make_clearance_function(ops, self.kind), point, *(grid or self.clearance_grid))
+
+    def shank_gaps(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> MX:
+        """Return by how much the shanks stay outside the steps (g, m) [m]."""
+        return self._map_samples(make_shank_function(ops, self.kind), point, *(grid or self.grid))
 
     def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
         """Return the integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
@@ -244,6 +249,14 @@ def make_clearance_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
         for name in "TSA"
     ]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
+
+
+def make_shank_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
+    """Return the function of ``compute_shank_gaps``; inputs of ``make_balanced_function``."""
+    inputs, _, stair, step = make_step_symbols(ops, kind)
+    angles = ca.vertcat(step.q.position, step.foot.position)
+    points = biped.locate_points(angles, step.stance_ankle.position)
+    return ca.Function("shanks", inputs, [ca.cse(planned.compute_shank_gaps(points, stair, SETBACK, kind))])
 
 
 @cache

@@ -1,5 +1,6 @@
 """The planned step of Bhardwaj et al.: curves of feet, ankle and hip over time, and the link angles that follow from them."""
 
+from collections.abc import Mapping
 from typing import Generic, Literal, NamedTuple, TypeVar
 
 import casadi as ca
@@ -12,6 +13,9 @@ from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion,
 
 PHASES = ("heel rises", "sole rises", "catch the cycloid", "track the cycloid")
 LEAST_DURATION = 1e-3  # [s]
+# Half of a shank's thickness, with 5 mm in reserve for the motion between samples [m]; and the width over which a limit on its
+# distance from an edge passes into one on the ankle's height above it [m].
+SHANK_RADIUS, SHANK_ROUNDING = 0.025, 0.005
 # Newton steps for the cycloid's first angle; from the cube root as guess, five reach machine precision.
 _NEWTON_STEPS = 6
 # Flat stairs begin their cycloid at its first point, where the root has no slope: at 2e-5 rad instead.
@@ -71,6 +75,27 @@ def compute_stair_height(x: SX, stair: Stair[SX], setback: float, width: float, 
     if step == "first":
         return stair.rise * edge(stair.tread)
     return stair.rise * (edge(0.0) + edge(stair.tread) - 1)
+
+
+def compute_shank_gaps(points: Mapping[str, SX], stair: Stair[SX], setback: float, step: StepKind = "next") -> SX:
+    """Return by how much the shanks stay outside the edges of the steps ahead of them (g,) [m], see ``list_shank_edges``.
+
+    A shank is far enough before an edge, or its ankle is above it.
+    """
+    gaps = []
+    for mark, level in list_shank_edges(step):
+        ankle, knee = points[f"A{mark}"], points[f"K{mark}"]
+        edge = ca.vertcat(level * stair.tread - setback, level * stair.rise)
+        along, ahead = knee - ankle, edge - ankle
+        before = (along[1] * ahead[0] - along[0] * ahead[1]) / get_rod("KA").length_m - SHANK_RADIUS
+        above = -ahead[1]
+        gaps.append((before + above + ca.sqrt((before - above) ** 2 + SHANK_ROUNDING**2)) / 2)
+    return ca.vertcat(*gaps)
+
+
+def list_shank_edges(step: StepKind) -> tuple[tuple[str, int], ...]:
+    """Return legs, primed the stance leg, and the edges that their shanks may meet: 1 ahead of the stance foot, 0 behind it."""
+    return (("'", 1), ("", 1)) if step == "first" else (("'", 1), ("", 0), ("", 1))
 
 
 def compute_foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
