@@ -19,8 +19,6 @@ import pytest
 from compare.study.record import read_record
 from compare.study.record_files import locate_record, write_records
 from compare.study.run_study import Study, run_study
-from compare.study.settings import Session, SolverSpec, StudySettings, write_manifest
-from compare.study.store import Store
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait import files
 from nlp_gait.backends.kernel import library_cache
@@ -111,20 +109,6 @@ def write_runs_of_other_settings(folder: Path, finished: Finished) -> None:
         finished(folder / "study.json")
 
 
-def store_results(folder: Path, finished: Finished) -> None:
-    for inputs in ({"seed": 1}, {"seed": 2}):
-        Store(folder).compute("one", inputs, lambda inputs=inputs: [inputs["seed"]] * 10)
-        finished(max((folder / "store").glob("one-*.json"), key=lambda path: path.stat().st_mtime_ns))
-
-
-def write_sessions(folder: Path, finished: Finished) -> None:
-    settings = StudySettings(problems=(WALK,), solvers=(SolverSpec(name="pso"),))
-    session = Session(command="x", started="now", machine={}, versions={}, kernel="", jobs="1")
-    for _ in range(2):
-        write_manifest(folder, settings, session)
-        finished(folder / "study.json")
-
-
 def store_a_library(folder: Path, finished: Finished) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(library_cache.FOLDER_VARIABLE, str(folder / "cache"))
@@ -180,8 +164,6 @@ class Journal:
         write_arrays,
         run_a_study,
         write_runs_of_other_settings,
-        store_results,
-        write_sessions,
         store_a_library,
     ],
 )

@@ -19,7 +19,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import nlp_gait
-from compare.cli import app
+from compare.cli import app, questions
 from compare.papers import load_reproduction
 from compare.papers.paper_runs import Effort, Runner
 from compare.questions import prices, robust_gait, sweep, variants
@@ -40,6 +40,8 @@ from tests.compare.records import DSP_X
 from tests.faults.processes import ROOT, start
 
 RUN = CliRunner()
+SWEEP, PSO = "sweep walk12 --over step_length_m=0.05:0.12:30 --starts 1", " --algorithm pso --evaluations 500"
+LIFTS, MOTORS = "sweep walk12 --over foot_lift_m=0.01,0.02 --starts 1", "variants --over motors --starts 1"
 
 
 def press_after(
@@ -115,31 +117,55 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
         signal.signal(signal.SIGINT, before)
 
 
+KEPT = r"; the results are in .*"
+NOTHING = r"; (\d) finished results are stored in .*"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("solver", "owner", "method", "calls", "effort", "said"),
+    ("owner", "name", "calls", "line", "said", "table"),
     [
-        ("ipopt", IterationWatch, "eval", 60, "--starts 1", ", not all of them solved in both directions"),
-        ("pso", CompiledObjective, "__call__", 30, "--algorithm pso --evaluations 500", ""),
+        (
+            IterationWatch,
+            "eval",
+            60,
+            SWEEP,
+            r"after (\d+) of 30 points, not all of them.*" + KEPT,
+            "step_length_m-ipopt",
+        ),
+        (CompiledObjective, "__call__", 30, SWEEP + PSO, r"after (\d+) of 30 points" + KEPT, "step_length_m-pso"),
+        (questions, "add_session", 1, LIFTS, "at the end" + KEPT, "foot_lift_m-ipopt"),
+        (variants, "solve", 2, MOTORS + " --set intervals=3", r"after (1) of 8 variants" + KEPT, "variants"),
+        (variants, "solve", 1, MOTORS, "after 0 of 8 variants" + NOTHING, ""),
+        (sweep, "solve_both_ways", 1, LIFTS, "after 0 of 4 solves" + NOTHING, ""),
+        (robust_gait, "solve", 1, "robust", NOTHING, ""),
+        (prices, "Continuation", 1, "prices walk12", NOTHING, ""),
     ],
-    ids=["ipopt", "pso"],
 )
-def test_sweep_writes_the_points_that_it_has(
-    solver: str,
-    owner: type,
-    method: str,
+def test_a_question_writes_what_it_has_or_counts_what_is_stored(
+    owner: object,
+    name: str,
     calls: int,
-    effort: str,
+    line: str,
     said: str,
+    table: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     coarse_pictures: None,
 ) -> None:
-    press_after(monkeypatch, owner, method, calls)
-    done = run("sweep", "walk12", "--over", "step_length_m=0.05:0.12:30", *effort.split(), "--out", str(tmp_path))
-    table = (tmp_path / f"walk12-sweep-step_length_m-{solver}.csv").read_text().splitlines()
-    assert 2 < len(table) < 31
-    assert f"after {len(table) - 1} of 30 points{said}; the results are in {tmp_path}; rerun" in done.stderr
+    (tmp_path / "store").mkdir()
+    (tmp_path / "store" / "solve-1.json").write_text("{}")
+    press_after(monkeypatch, owner, name, calls)
+    done = run(*line.split(), "--out", str(tmp_path))
+    match = re.fullmatch(rf"nlp-gait: interrupted ?{said}; rerun the command to continue\n", done.stderr)
+    assert match is not None and f" in {tmp_path};" in done.stderr, done.stderr
+    if table:
+        (file,) = tmp_path.glob(f"*-{table}.csv")
+        points = len(file.read_text().splitlines()) - 1
+        assert (points == int(match[1]) >= 1 if match.groups() else points == 2) and done.stdout
+    else:
+        assert int(match[1]) == len(list(tmp_path.glob("store/*.json"))) >= 1
+        assert [path.name for path in tmp_path.iterdir()] == ["store"]
 
 
 def test_a_path_carries_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -195,48 +221,6 @@ def test_simulate_keeps_the_simulation(tmp_path: Path, monkeypatch: pytest.Monke
     assert f"interrupted in the tests of robustness; the simulation is stored in {tmp_path}" in done.stderr
     assert {"report.json", "model.xml", "simulation.npz"} <= {path.name for path in tmp_path.iterdir()}
     assert "robustness" not in json.loads((tmp_path / "report.json").read_text())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("owner", "function", "line", "said"),
-    [
-        (sweep, "solve_both_ways", "sweep walk12 --over foot_lift_m=0.01,0.02 --starts 1", " after 0 of 4 solves"),
-        (variants, "solve", "variants --over motors", " after 0 of 8 variants"),
-        (robust_gait, "solve", "robust", ""),
-        (prices, "Continuation", "prices walk12", ""),
-    ],
-)
-def test_a_question_before_its_first_result_counts_the_stored_results(
-    owner: object, function: str, line: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "store").mkdir()
-    (tmp_path / "store" / "solve-1.json").write_text("{}")
-    press_after(monkeypatch, owner, function, 1)
-    error = run(*line.split(), "--out", str(tmp_path)).stderr
-    stored = int(re.fullmatch(rf"nlp-gait: interrupted{said}; (\d) finished results are stored .*\n", error)[1])  # type: ignore[index]
-    assert stored == len(list(tmp_path.glob("store/*.json"))) >= 1
-    assert f"are stored in {tmp_path}; rerun the command to continue\n" in error
-    assert [path.name for path in tmp_path.iterdir()] == ["store"]
-
-
-@pytest.mark.slow
-def test_variants_writes_the_finished_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    press_after(monkeypatch, variants, "solve", 2)
-    done = run(*"variants --over motors --set intervals=3 --starts 1 --out".split(), str(tmp_path))
-    assert f"after 1 of 8 variants; the results are in {tmp_path}; rerun the command to continue\n" in done.stderr
-    assert len((tmp_path / "nao-ssp-variants.csv").read_text().splitlines()) == 2
-
-
-@pytest.mark.slow
-def test_sweep_while_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from matplotlib.figure import Figure
-
-    press_after(monkeypatch, Figure, "savefig", 1)
-    done = run(*"sweep walk12 --over foot_lift_m=0.01,0.02 --starts 1 --out".split(), str(tmp_path))
-    sentence = f"interrupted at the end; the results are in {tmp_path}; rerun the command to continue"
-    assert done.stderr == f"nlp-gait: {sentence}\n"
-    assert "walk12 by ipopt" in done.stdout and len(list(tmp_path.glob("*.png"))) == 1
 
 
 PRESSED_AT_IMPORT = """

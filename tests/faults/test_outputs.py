@@ -1,76 +1,153 @@
-"""Outputs that are closed, full, of another encoding, or named in bytes that are no text: a result or one sentence."""
+"""Files and outputs of commands: inputs and files of other programs stay, and what cannot be written is one sentence."""
 
 from __future__ import annotations
 
-import io
+import json
 import os
+import shutil
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
-from compare.cli.command import run_app
-from nlp_gait import __version__, load, make_solver, solve
-from nlp_gait.backends.kernel.compiler import _find, find_compiler
-from nlp_gait.errors import GaitError
-from tests.compare.cli.calls import one_sentence
+from compare.cli import app
+from nlp_gait import __version__, load
+from nlp_gait.errors import GaitError, OutputError
+from nlp_gait.files import protect_inputs, write_text
+from tests.compare.cli.calls import nlp_gait, one_sentence
 from tests.faults.processes import ROOT, in_own_mounts
+from tests.robots.custom import humanoid
 
-FULL = Path("/dev/full")
-EVALUATE = "evaluate walk12 --x 0.1,0.1,0.01,0.01"
+RUN = CliRunner()
+X = "--x 0.1,0.1,0.01,0.01"
 
 
-def shell(script: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """A line of sh in which ``$gait`` is the command line."""
-    return subprocess.run(
-        ["sh", "-c", f'gait="{sys.executable} -P -m nlp_gait"; {script}'],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        errors="surrogateescape",
-        timeout=120,
-    )
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with a robot, a source file, points and a result."""
+    monkeypatch.chdir(tmp_path)
+    Path("my.json").write_text(json.dumps(humanoid()))
+    shutil.copy(ROOT / "examples" / "bring_your_own.py", "byo.py")
+    names = load("walk12").names
+    Path("p.csv").write_text(",".join(names) + "\n" + ",".join(["0.1"] * len(names)) + "\n")
+    Path("w.json").write_text(json.dumps({"problem": "walk12", "x": dict.fromkeys(names, 0.1)}))
+    Path("link.json").symlink_to("my.json")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        ("solve nao-dsp --robot my.json --starts 1 --out my.json", "my.json"),
+        ("solve nao-dsp --robot link.json --starts 1 --out my.json", "my.json"),
+        ("solve nao-dsp --set robot=my.json --starts 1 --out ./my.json", "my.json"),
+        ("list --robot my.json --out my.json", "my.json"),
+        ("solve byo.py:two_link --starts 1 --out byo.py", "byo.py"),
+        ("evaluate walk12 --x p.csv --csv ../{name}/p.csv", "p.csv"),
+        ("export w.json --to json --out w.json", "w.json"),
+    ],
+)
+def test_no_command_writes_over_its_input(call: str, name: str, folder: Path) -> None:
+    before = Path(name).read_bytes()
+    assert "this command reads it; name another file" in one_sentence(*call.format(name=folder.name).split())
+    assert Path(name).read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        ("evaluate walk12 --x p.csv --csv {}", "notes.csv"),
+        ("export w.json --to json --out {}", "notes.json"),
+        ("solve byo.py:two_link --starts 1 --out {}", "notes.json"),
+        ("export w.json --to csv --out {}", "notes.csv"),
+        ("export w.json --to html --out {}", "notes.html"),
+        ("export w.json --to gif --out {}", "notes.gif"),
+        (f"evaluate walk12 {X} --signals {{}}", "notes.npz"),
+        ("list --robot my.json --out {}", "notes.png"),
+        ("export walk12-w100 --to objective --out .", "main.c"),
+        ("export walk12-w100 --to objective --out .", "gaitbench_walk12_w100.cpp"),
+    ],
+)
+def test_a_file_of_another_program_is_replaced_only_by_force(call: str, name: str, folder: Path) -> None:
+    words = call.format(name).split()
+    for content in (b"", b"notes of the user", bytes(range(256))):
+        Path(name).write_bytes(content)
+        before = set(folder.iterdir())
+        assert "name another file, or give --force" in one_sentence(*words)
+        assert Path(name).read_bytes() == content and set(folder.iterdir()) == before
+    for again in (["--force"], []):  # then it is one of this program
+        nlp_gait(*words, *again)
+
+
+@pytest.mark.parametrize("ending", [".urdf", ".xml"])
+def test_files_that_a_robot_refers_to_stay(ending: str, folder: Path) -> None:
+    """Also where the output is not named but made, as in a folder."""
+    pytest.importorskip("mujoco" if ending == ".xml" else "lxml")
+    mesh, include = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", "more.xml"
+    Path("foot.obj").write_text(mesh)
+    Path(include).write_text("<mujocoinclude><asset/></mujocoinclude>")
+    robot, names = {
+        ".urdf": (
+            '<robot name="r"><link name="a"><collision><geometry><mesh filename="foot.obj"/></geometry></collision></link>'
+            "</robot>",
+            ["foot.obj"],
+        ),
+        ".xml": (
+            '<mujoco><include file="more.xml"/><asset><mesh file="foot.obj"/></asset><worldbody><body><freejoint/>'
+            '<geom type="mesh" mesh="foot"/></body></worldbody></mujoco>',
+            ["foot.obj", include],
+        ),
+    }[ending]
+    Path(f"r{ending}").write_text(robot)
+    for force in ([], ["--force"]):
+        RUN.invoke(app, ["list", "--robot", f"r{ending}", "--out", "r.png", *force])
+        for name in names:
+            with nullcontext() if force else pytest.raises(OutputError, match="this command reads it"):
+                write_text(folder / name, mesh)
+
+
+def test_the_next_command_may_write_the_file(folder: Path) -> None:
+    protect_inputs([folder / "w.json"])
+    with pytest.raises(OutputError, match="this command reads it"):
+        write_text(folder / "w.json", "")
+    nlp_gait("evaluate", "walk12", "--x", "p.csv", "--csv", "w.json", "--force")
+    protect_inputs([])
+    write_text(folder / "w.json", "")
+
+
+PRINTS = "print(chr(0x202f))"
+BREAKS = "(_ for _ in ()).throw(BrokenPipeError(32, ''))"
 
 
 @pytest.mark.slow
-def test_numbers_are_printed_in_every_encoding(monkeypatch: pytest.MonkeyPatch) -> None:
-    done = shell(f"$gait {EVALUATE}", PYTHONIOENCODING="ascii")
-    assert (done.returncode, done.stderr) == (0, "")
-    for encoding in ("ascii", "latin-1", "cp1252"):
-        stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
-        monkeypatch.setattr(sys, "stdout", stream)
-        run_app(lambda: print("1\u202f000"))
-        stream.flush()
-        assert stream.buffer.getvalue() == b"1?000\n"  # type: ignore[attr-defined]
-
-
-@pytest.mark.slow
-def test_a_closed_output_is_refused_before_anything_is_written_into_a_file_in_its_place() -> None:
-    done = shell("$gait --version >&-")
-    assert done.returncode == 1 and done.stderr.startswith("nlp-gait: standard output is closed; ")
-    assert done.stderr.count("\n") == 1
-    closed = shell("$gait --version 2>&-")
-    assert (closed.returncode, closed.stdout.strip()) == (0, __version__)
-    assert shell("$gait list nosuch 2>&-").returncode == 1
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
-def test_help_that_cannot_be_written_is_reported() -> None:
-    done = shell("$gait solve --help >/dev/full")
-    assert (done.returncode, done.stderr) == (1, "nlp-gait: cannot write the output: No space left on device\n")
-
-
-@pytest.mark.slow
-def test_a_broken_pipe_is_silent_only_if_it_is_the_outputs() -> None:
-    pipe = "import errno, sys; from compare.cli.command import run_app\ndef fails(): raise BrokenPipeError(errno.EPIPE, '')\n"
-    program = f'{sys.executable} -c "{pipe}run_app(fails)"'
-    done = shell(program)
-    assert (done.returncode, done.stderr) == (1, "nlp-gait: a child process exited unexpectedly\n")
-    assert shell(f"{{ sleep 0.2; {program}; echo $? >&2; }} | true").stderr == "1\n"
+@pytest.mark.parametrize(
+    ("script", "status", "printed", "said"),
+    [
+        (f"PYTHONIOENCODING=ascii $gait evaluate walk12 {X}", 0, "walk12: f ", ""),
+        (f'PYTHONIOENCODING=ascii $run "{PRINTS}"', 0, "?\n", ""),
+        (f'PYTHONIOENCODING=cp1252 $run "{PRINTS}"', 0, "?\n", ""),
+        ("$gait --version >&-", 1, "", "nlp-gait: standard output is closed; send it to a file or to /dev/null\n"),
+        ("$gait --version 2>&-", 0, f"{__version__}\n", ""),
+        ("$gait list nosuch 2>&-", 1, "", ""),
+        ("$gait solve --help >/dev/full", 1, "", "nlp-gait: cannot write the output: No space left on device\n"),
+        (f'$run "{BREAKS}"', 1, "", "nlp-gait: a child process exited unexpectedly\n"),
+        (f'{{ sleep 0.2; $run "{BREAKS}"; echo $? >&2; }} | true', 0, "", "1\n"),
+    ],
+)
+def test_outputs_that_are_closed_full_or_of_another_encoding(script: str, status: int, printed: str, said: str) -> None:
+    code = "import sys; from compare.cli.command import run_app; run_app(lambda: eval(sys.argv[1]))"
+    words = {"$gait": f"{sys.executable} -P -m nlp_gait", "$run": f"{sys.executable} -c '{code}'"}
+    for name, command in words.items():
+        script = script.replace(name, command)
+    done = subprocess.run(
+        ["sh", "-c", script],
+        cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (status, said)
+    assert done.stdout.startswith(printed) and bool(done.stdout) == bool(printed)
 
 
 @pytest.mark.slow
@@ -80,7 +157,7 @@ def test_a_broken_pipe_is_silent_only_if_it_is_the_outputs() -> None:
         "compare walk12 --runs 1 --starts 1 --evaluations 100 --out",
         "solve walk12 --starts 1 --out",
         "sweep walk12 --over foot_lift_m=0.01,0.02 --out",
-        "evaluate walk12 --x 0.1,0.1,0.01,0.01 --signals",
+        f"evaluate walk12 {X} --signals",
     ],
 )
 def test_a_name_that_is_not_text_is_refused_before_the_work(arguments: str, tmp_path: Path) -> None:
@@ -99,7 +176,7 @@ def test_robots_and_code_that_no_record_could_name_are_refused(tmp_path: Path) -
             load(problem, **options)
 
 
-@pytest.mark.parametrize("path", [".", "..", "nosuch/..", "/"])
+@pytest.mark.parametrize("path", [".", "nosuch/..", "/"])
 def test_a_folder_in_place_of_a_result_is_reported(path: str) -> None:
     for command in (["export", path, "--to", "gif"], ["export", path, "--to", "csv"], ["simulate", path]):
         assert "cannot be read" in one_sentence(*command)
@@ -119,20 +196,3 @@ def test_no_room_for_temporary_files_is_one_sentence(tmp_path: Path) -> None:
     done = in_own_mounts(script, str(tmp_path))
     assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
     assert done.stderr.startswith("nlp-gait: no folder for temporary files: ") and "TMPDIR" in done.stderr
-
-
-@pytest.mark.parametrize("named", ['g++ "', '""', "'", "g++ \\"])
-def test_a_compiler_that_is_not_a_command_line_is_skipped(named: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("CC", raising=False)
-    monkeypatch.delenv("CXX", raising=False)
-    usual = find_compiler().command
-    monkeypatch.setenv("CXX", named)
-    assert find_compiler().command == usual
-    _find.cache_clear()
-
-
-def test_slsqp_with_every_variable_fixed_ends_at_that_point() -> None:
-    problem = load("walk12")
-    x = problem.by_name((problem.lower + problem.upper) / 2)
-    found = solve(problem, fix=x, solver=make_solver("slsqp"))
-    assert dict(found.x) == pytest.approx(x) and found.best.iterations == 0

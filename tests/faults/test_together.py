@@ -19,7 +19,7 @@ import pytest
 import nlp_gait
 from compare.judge import evaluate
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from tests.backends.toys import corner, toy
 from tests.faults.processes import ROOT
@@ -55,12 +55,7 @@ def test_four_threads_solve_one_problem_and_build_it_once() -> None:
     assert all(success for success, *_ in shared)
 
 
-def test_threads_may_use_what_was_never_built_and_the_interpreted_objective(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_compiler() -> None:
-        raise CompilerError("none here")
-
-    monkeypatch.setattr("nlp_gait.backends.kernel.compiled.find_compiler", no_compiler)
-
+def test_threads_may_use_what_was_never_built_and_the_interpreted_objective(without_compiler: None) -> None:
     def values(_: int) -> list[float]:
         problem = nlp_gait.load("walk12")
         objective = nlp_gait.compile_objective(problem)
@@ -69,8 +64,8 @@ def test_threads_may_use_what_was_never_built_and_the_interpreted_objective(monk
         return [*objective(points)[0].tolist(), float(evaluate(problem, points[0]).objective["value"])]
 
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(values, range(4)))
-    assert all(row == found[0] for row in found)
+        first, *others = pool.map(values, range(4))
+    assert others == [first] * 3
 
 
 FORKED = """
@@ -104,21 +99,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("method", [m for m in ("fork", "spawn") if m in multiprocessing.get_all_start_methods()])
-def test_an_objective_that_was_used_goes_to_a_pool(method: str, tmp_path: Path) -> None:
-    program = tmp_path / "program.py"
-    program.write_text(FORKED)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, str(program), method], env=environment, capture_output=True, text=True, timeout=100
-    )
-    assert done.stdout == "equal\n", done.stderr
-
-
-@pytest.mark.slow
-def test_a_fork_waits_until_no_other_thread_is_inside_casadi() -> None:
-    program = """
+BUSY = """
 import os, threading, nlp_gait
 problem = nlp_gait.load("walk12")
 nlp_gait.solve(problem)
@@ -130,22 +111,27 @@ if child == 0:
     for where in (lambda work: work(), lambda work: (alone := threading.Thread(target=work), alone.start(), alone.join(60))):
         where(lambda: found.append(nlp_gait.solve(problem).converged))
     os._exit(0 if found == [True, True] else 1)
-print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 busy.join()
+print("equal")
 """
-    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=200)
-    assert done.stdout == "0\n", done.stderr
+METHODS = [m for m in ("fork", "spawn") if m in multiprocessing.get_all_start_methods()]
 
 
-def same(first: GaitProblem, second: GaitProblem) -> bool:
-    """Whether two problems have one meaning, and one value at their start points."""
-    points = [problem.start_point(np.random.default_rng(0)) for problem in (first, second)]
-    values = [evaluate(problem, points[0]).violation for problem in (first, second)]
-    return (
-        (first.address, first.options, first.values) == (second.address, second.options, second.values)
-        and np.array_equal(*points)
-        and values[0] == values[1]
+@pytest.mark.slow
+@pytest.mark.parametrize(("program", "method"), [*((FORKED, method) for method in METHODS), (BUSY, "")])
+def test_what_was_used_goes_to_other_processes(program: str, method: str, tmp_path: Path) -> None:
+    """A fork waits until no other thread is inside CasADi."""
+    path = tmp_path / "program.py"
+    path.write_text(program)
+    done = subprocess.run(
+        [sys.executable, str(path), method],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=200,
     )
+    assert done.stdout == "equal\n", done.stderr
 
 
 @pytest.mark.parametrize(
@@ -166,7 +152,9 @@ def test_a_problem_is_pickled_as_its_maker_options_and_values(make: Callable[[],
     text = pickle.dumps(problem)
     assert len(text) < 20_000
     again = pickle.loads(text)
-    assert same(again, problem)
+    assert (again.address, again.options, again.values) == (problem.address, problem.options, problem.values)
+    first, second = (made.start_point(np.random.default_rng(0)) for made in (problem, again))
+    assert np.array_equal(first, second) and evaluate(problem, first).violation == evaluate(again, first).violation
     assert build_exact_model(pickle.loads(text)) is build_exact_model(again)  # built once
     assert copy.deepcopy(problem) is copy.copy(problem) is problem
 
