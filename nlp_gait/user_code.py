@@ -14,14 +14,14 @@ import shlex
 import shutil
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
 from functools import cache, lru_cache, partial
-from importlib.machinery import SourceFileLoader
 from importlib.metadata import entry_points
 from pathlib import Path
+from symtable import symtable
 from tempfile import TemporaryDirectory
-from types import CodeType, ModuleType
+from types import ModuleType
 from typing import Literal, NamedTuple, TypeVar
 
 from nlp_gait.errors import GaitError, UserCodeError, unknown
@@ -40,6 +40,7 @@ ENDING = ".py"
 PROGRAM = "cmd:"
 LARGEST_SOURCE = 4 * 2**20  # bytes
 LARGEST_PROGRAM = 64 * 2**20  # it may be compiled
+IMPORTS_ALL = re.compile(rb"\bimport\s*\*")
 HAS_DOCSTRING = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 _allowed: dict[str, str] = {}
@@ -264,25 +265,14 @@ def check_reference(text: str, kind: Kind) -> None:
     place = parse_reference(text, kind)
     if is_program(text):
         return
+    path, content = _read_source(place, text)
     try:
-        tree = ast.parse(_read_source(place, text)[1])
+        symbols = symtable(importlib.util.decode_source(content), path, "exec").get_symbols()
     except (SyntaxError, ValueError):
         return  # running it reports the error
-    names = set(_find_names(tree.body))
-    if place.name not in names and "*" not in names:
+    names = [symbol.get_name() for symbol in symbols if symbol.is_assigned() or symbol.is_imported()]
+    if place.name not in names and not IMPORTS_ALL.search(content):
         raise unknown(f"name in {Path(place.home).name}", place.name, names)
-
-
-def _find_names(body: Iterable[ast.AST]) -> Iterator[str]:
-    for node in body:
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
-            yield node.name
-        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            yield node.id
-        elif isinstance(node, (ast.Import, ast.ImportFrom)):
-            yield from (alias.asname or alias.name.partition(".")[0] for alias in node.names)
-        else:
-            yield from _find_names(ast.iter_child_nodes(node))
 
 
 def load_object(text: str, kind: Kind) -> object:
@@ -316,31 +306,20 @@ def call_user_code(text: str, path: str, call: Callable[[], T]) -> T:
         raise UserCodeError(f"{text!r} fails{where}: {what}") from error
 
 
-class _ContentLoader(SourceFileLoader):
-    """Loader of the bytes that were hashed; a compiled file in the cache may belong to an older text."""
-
-    content = b""
-
-    def get_code(self, fullname: str) -> CodeType:
-        return self.source_to_code(self.content, self.path)
-
-
 def _run_file(path: str, content: bytes) -> ModuleType:
     digest = hashlib.sha256(path.encode() + b"\0" + content).hexdigest()[:16]
     name = f"nlp_gait_own_{digest}_{Path(path).stem}"
     if name in sys.modules:
         return sys.modules[name]
-    loader = _ContentLoader(name, path)
-    loader.content = content
-    spec = importlib.util.spec_from_file_location(name, path, loader=loader)
-    assert spec is not None  # for the type checker
-    module = importlib.util.module_from_spec(spec)
+    module = ModuleType(name)
+    module.__file__ = path
     folder = str(Path(path).parent)
     if folder not in sys.path:
         sys.path.append(folder)  # last, so that no file in it hides a package
     sys.modules[name] = module  # before it runs: its data classes look there
     try:
-        loader.exec_module(module)
+        # The bytes that were hashed; a compiled file in the cache may belong to an older text.
+        exec(compile(content, path, "exec", dont_inherit=True), vars(module))  # noqa: S102  code that the user named
     except BaseException:
         del sys.modules[name]
         raise

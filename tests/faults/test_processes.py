@@ -155,12 +155,14 @@ def write_study(folder: Path, study: int, barrier: Barrier) -> None:
     """Write all records of a study, in step with the others, and read those of this study back in between."""
     tasks = [make_task(50 + study, run, f"study {study}") for run in range(RUNS)]
     records = [RunRecord.make_failed(task, "tried") for task in tasks]
-    barrier.wait(60)
     for count in range(1, RUNS + 1):
+        barrier.wait(60)
         write_records(records[:count], folder)
         stored = find_record(folder, tasks[count - 1])
         assert stored is not None and stored.inputs.stop["evaluations"] == 50 + study
         assert len(read_records(folder)) >= count  # as for the report, while others write
+        barrier.wait(60)
+        assert len(read_records(folder)) == STUDIES * count
 
 
 @pytest.mark.slow
