@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from docs.pages import algorithms, api, commands, front, gallery, gradient, model, papers, playground, problems  # noqa: E402
+from docs.pages import algorithms, api, commands, front, gallery, gradient, model, numbers, papers, playground, problems  # noqa: E402
 from docs.pages.api import linked  # noqa: E402
 
 project = "nlp-gait"
@@ -29,6 +29,7 @@ exclude_patterns = [
     "generated/model",
     "generated/gradient",
     "generated/study",
+    "generated/numbers",
     "generated/gallery/*.ipynb",
     "generated/gallery/*.py",
     "**/sg_execution_times.*",
@@ -37,7 +38,8 @@ suppress_warnings = ["config.cache"]  # the gallery's configuration holds functi
 nitpicky = False
 default_role = "code"
 
-myst_enable_extensions = ["colon_fence", "dollarmath", "fieldlist"]
+myst_enable_extensions = ["colon_fence", "dollarmath", "fieldlist", "substitution"]
+myst_substitutions = numbers.list_substitutions()
 myst_dmath_double_inline = False
 html_math_renderer = "mathml"
 myst_heading_anchors = 4
@@ -77,5 +79,5 @@ def setup(app):
 def write_pages(app):
     """Pages of problems, papers, algorithms, commands and names, and the playground."""
     folder = Path(app.srcdir) / "generated"
-    for part in (problems, papers, algorithms, commands, api, model, gradient, playground, front):
+    for part in (numbers, problems, papers, algorithms, commands, api, model, gradient, playground, front):
         part.write(folder)

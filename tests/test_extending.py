@@ -1,4 +1,4 @@
-"""The extensions under "To add a ..." in docs/architecture.md: each takes one new file and at most two lines elsewhere."""
+"""The extensions under "To add a ..." in docs/developing.md: each takes one new file and at most two lines elsewhere."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ NAME = (
 ROBOT = "Show a robot as read: URDF, MJCF (.xml), JSON, or a name; with a problem, that problem for this robot."
 CITE = "Print BibTeX of a problem, a paper or an instance of GaitBench; of all without NAME."
 OVERRIDE = (
-    "override any of this in a JSON file next to the model, see docs/custom-robots.md; gaits: solve humanoid-ssp, humanoid-dsp "
+    "override any of this in a JSON file next to the model, see docs/robots.md; gaits: solve humanoid-ssp, humanoid-dsp "
     "or humanoid-cycle with --robot {}; whole walks: plan --robot"
 )
 

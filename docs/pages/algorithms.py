@@ -14,7 +14,7 @@ INTRODUCTION = """# Algorithms and solvers
 
 Every name here stands wherever a command or a study asks for an algorithm, and settings are given in a study file or in Python:
 `metaheuristics.make_algorithm("pso", population=80)`, `nlp_gait.make_solver("ipopt", ...)`. `nlp-gait list NAME` prints it, too.
-[Your own algorithm](../bring-your-own.md) takes part as `FILE.py:NAME`. How often each default search comes within 0.1 % of the
+[Your own algorithm](../researcher.md) takes part as `FILE.py:NAME`. How often each default search comes within 0.1 % of the
 best known point stands on the [page of each problem](problems/index.md)."""
 PARTS = {
     "Searches": ("They see the compiled objective in batches, and no derivatives.", metaheuristics.ALGORITHMS),
@@ -23,7 +23,7 @@ PARTS = {
         metaheuristics.ADAPTERS,
     ),
     "For several objectives": ("For `nlp-gait pareto` only, with the extra `algorithms`.", FRONT_ALGORITHMS),
-    "NLP solvers": ("They see the lifted NLP with exact derivatives; see [solving](../solving.md).", SOLVERS),
+    "NLP solvers": ("They see the lifted NLP with exact derivatives; see [computing](../computing.md).", SOLVERS),
 }
 
 

@@ -35,14 +35,14 @@ INTRODUCTION = """# Problems
 
 Each page is generated from the problem; figures of solvers were measured by `python -m docs.difficulty` with default
 options and values. Near: within 0.1 % of the best known point. [GaitBench](../../gaitbench.md) freezes variants of them, and
-[your own](../../bring-your-own.md) is used as `FILE.py:NAME`."""
+[your own](../../researcher.md) is used as `FILE.py:NAME`."""
 SIZES = Path(__file__).parents[1] / "nlp_sizes.json"
 KEYS = ("variables", "lifted", "constraints", "equations", "jacobian", "hessian")  # of SIZES
 SIZES_INTRODUCTION = """## Sizes of the NLPs
 
 What NLP solvers receive with default options: scaled variables and those of lifted operations, the lower triangle of the Hessian;
 measured by `python -m docs.nlp_sizes`. `nlp-gait export PROBLEM --to nl --out DIR` writes one as an `.nl` file,
-[for solver developers](../../gaitbench.md#nlps-for-solver-developers)."""
+[for solver developers](../../control-engineer.md#nlps-for-solver-developers)."""
 CATALOGUE = Path(__file__).parents[1] / "gaitbench.json"
 INSTANCES = """## Instances of GaitBench
 
@@ -77,6 +77,8 @@ def write(folder: Path) -> None:
         nlp_sizes(),
         INSTANCES,
         list_instances(),
+        CERTIFICATES,
+        list_certificates(),
         toctree(problems),
     )
     write_all(folder, pages)

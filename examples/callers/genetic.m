@@ -1,4 +1,4 @@
-% A genetic algorithm: nlp-gait compare nao-ssp --algorithms 'cmd:octave-cli --quiet genetic.m' (MATLAB: see docs/bring-your-own.md)
+% A genetic algorithm: nlp-gait compare nao-ssp --algorithms 'cmd:octave-cli --quiet genetic.m' (MATLAB: see docs/researcher.md)
 1;
 function cost = evaluate(X)  % one number for each row of X, less is better; ends the program when the run is over
   rows = sprintf(['[' strjoin(repmat({'%.17g'}, 1, columns(X)), ',') '],'], X');

@@ -87,7 +87,7 @@ def find_legs(robot: str, links: Links, joints: Joints, feet: Feet) -> Legs:
             candidates.append((split[0][0].place[2], legs))
     remedy = (
         'name the feet in the JSON file next to the model: "feet": {"left": {"link": "..."}, "right": {"link": "..."}} '
-        "(docs/custom-robots.md describes the supported legs)"
+        "(docs/robots.md describes the supported legs)"
     )
     if not candidates:
         _, fault, pair = min(others_m, default=(0.0, "", ("", "")))
@@ -202,7 +202,7 @@ def _find_sole(robot: str, link: str, read_shapes: ReadShapes) -> InferredSole:
     points, kind, missing = read_shapes(link)
     write = (
         'write its sole into the JSON file next to the model: "ankle_height_m", "front_m", "back_m", "left_m", "right_m" '
-        "(see docs/custom-robots.md)"
+        "(see docs/robots.md)"
     )
     if missing:
         raise RobotDataError(

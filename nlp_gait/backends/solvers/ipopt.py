@@ -77,7 +77,7 @@ class IpoptSettings(Solver):
     #: ma27, ma57, ma77, ma86, ma97, pardiso, mumps or spral; None for IPOPT's default. One that does not run here is an error;
     #: it is never replaced by another one
     linear_solver: str | None = None
-    #: whether a run begins with the rows that matter instead of all, see docs/solving.md; None: where the functions are
+    #: whether a run begins with the rows that matter instead of all, see docs/computing.md; None: where the functions are
     #: compiled, because selecting the rows takes a run
     few_rows: bool | None = None
     #: of the sigmoids that replace a jump, one stage for each, in units of the switch [m for a margin]; empty for those of the
