@@ -62,9 +62,7 @@ def tune_solvers(study: Study, settings: StudySettings, trials: int, progress: C
         if chosen:
             solvers.append(replace(solver, settings={**solver.settings, **chosen}, label=f"{task.title}-tuned"))
     if not tunable:
-        raise InputError(
-            "no solver of this study has settings with ranges; docs/researcher.md says how to give them"
-        )
+        raise InputError("no solver of this study has settings with ranges; docs/researcher.md says how to give them")
     return replace(settings, solvers=tuple(solvers))
 
 
