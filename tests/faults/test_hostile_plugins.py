@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 import compare.study.run_task
-from compare.study.record import RunRecord
 from compare.study.record_files import read_records
 from compare.study.run_study import Study, run_study
 from compare.study.run_task import try_task
@@ -78,6 +77,7 @@ WAYS: dict[str, tuple[str, str, str | None]] = {
     ),
     "leaves a child": ("start", "os.fork() or time.sleep(10**6)", None),
 }
+ALL = "f, lower, upper, evaluations, seed"  # what a plain function takes
 ENDED = ("evaluation budget used", "time limit reached")
 
 
@@ -129,33 +129,26 @@ def test_a_study_with_workers_takes_them_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_plain_function_is_stopped_at_its_budget_even_if_it_ignores_it(impatient: None, tmp_path: Path) -> None:
-    (tmp_path / "own.py").write_text(
-        "def stubborn(f, lower, upper, evaluations, seed):\n"
-        "    while True:\n"
-        "        try:\n            f((lower + upper) / 2)\n"
-        "        except BaseException:\n            seed += 1\n"
-        "        if seed < 0: break\n"
-        "def deaf(f, lower, upper, evaluations, seed):\n"
-        "    for _ in range(10 * evaluations):\n"
-        "        try:\n            f((lower + upper) / 2)\n        except BaseException:\n            pass\n"
-        "def lazy(f, lower, upper, evaluations, seed):\n    return lower\n"
-        "def wrong(f, lower, upper, evaluations, seed):\n    f(lower[:2])\n"
-        "def few(f, lower):\n    f(lower)\n"
+@pytest.mark.parametrize(
+    ("arguments", "body", "said"),
+    [
+        (ALL, "while seed >= 0:\n  try: f(lower)\n  except BaseException: seed += 1", "did not return"),
+        (ALL, "for _ in range(9999):\n  try: f(lower)\n  except BaseException: pass", "evaluation budget used"),
+        (ALL, "return lower", "returned without any call of f"),
+        (ALL, "f(lower[:2])", r"f takes one point of shape \(4,\)"),
+        ("f, lower", "f(lower)", r"a plain function takes \(f, lower, upper, evaluations, seed\)"),
+    ],
+)
+def test_a_plain_function_is_stopped_at_its_budget_even_if_it_ignores_it(
+    arguments: str, body: str, said: str, impatient: None, tmp_path: Path
+) -> None:
+    (tmp_path / "own.py").write_text(f"def search({arguments}):\n {body}\n")
+    stop = STOP if said == "did not return" else PATIENT
+    record = try_task(Task(problem=WALK, solver=f"{tmp_path / 'own.py'}:search", stop=stop))
+    assert re.search(said, record.status)
+    assert record.claimed == (said == "evaluation budget used") and (
+        not record.claimed or record.evaluations["f"] == 200
     )
-
-    def record(name: str, stop: Stop) -> RunRecord:
-        return try_task(Task(problem=WALK, solver=f"{tmp_path / 'own.py'}:{name}", stop=stop))
-
-    def status(name: str) -> str:
-        return record(name, PATIENT).status
-
-    assert "did not return" in record("stubborn", STOP).status
-    deaf = record("deaf", PATIENT)
-    assert (deaf.status, deaf.evaluations) == ("evaluation budget used", {"f": 200})
-    assert "returned without any call of f" in status("lazy")
-    assert "f takes one point of shape (4,)" in status("wrong")
-    assert "a plain function takes (f, lower, upper, evaluations, seed)" in status("few")
 
 
 def test_missing_user_code_is_reported_before_the_work(tmp_path: Path) -> None:
