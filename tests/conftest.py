@@ -35,7 +35,7 @@ gc.set_threshold(100_000, 20, 100)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Programs that pip does not install, and that tests marked `program` need.
-PROGRAMS = ("Rscript", "gjh_asl_json", "julia", "mkoctfile", "octave-cli", "pdflatex")
+PROGRAMS = ("Rscript", "julia", "mkoctfile", "octave-cli", "pdflatex")
 
 # Folders of tests that start whole commands, studies and papers; other slow tests are marked where they stand.
 SLOW_FOLDERS = tuple(f"tests/compare/{name}/" for name in ("cli", "papers", "questions"))

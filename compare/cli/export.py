@@ -11,26 +11,21 @@ from compare.cli.command import OUTPUT_OF_ANY_KIND, check_output_file, command, 
 from compare.cli.options import Code, Limits, ProblemOptions, Values, name_all
 from compare.cli.printing import Output
 from compare.study.record import load_result_or_record
-from compare.study.references import find_reference
 from nlp_gait import gaitbench
-from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.export.formats import FORMATS, PERIOD_MS, write_as
-from nlp_gait.export.nl_file import export_nl
 from nlp_gait.export.solver import export_solver
 from nlp_gait.formulation import Result
 from nlp_gait.gaitbench.c_export import export_objective
 from nlp_gait.simulation.video import check_frames, check_video_path, write_video
 
 FRAMES_PER_S = 12.5
-SOURCE = (
-    "A gait from `solve --out` or `plan --out`; for objective, solver and nl a problem or an instance of GaitBench."
-)
+SOURCE = "A gait from `solve --out` or `plan --out`; for objective and solver a problem or an instance of GaitBench."
 KIND = (
-    "Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, ros; gif or html. Of a problem: objective (C++), solver "
-    "(NLP with derivatives in C++) or nl (for AMPL's solvers)."
+    "Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, ros; gif or html. Of a problem: objective (C++) or "
+    "solver (NLP with derivatives in C++)."
 )
-OUT = "File, by default next to the result; for objective, solver and nl a folder."
+OUT = "File, by default next to the result; for objective and solver a folder."
 
 
 @command
@@ -99,11 +94,6 @@ def _write_solver(source: str, changes: ProblemOptions, folder: Path) -> list[Pa
     return export_solver(changes.make_spec(source).load(), folder)
 
 
-def _write_nl(source: str, changes: ProblemOptions, folder: Path) -> list[Path]:
-    problem = changes.make_spec(source).load()
-    return export_nl(problem, folder, find_reference(identify_problem(problem)).to_json())
-
-
 # Kinds of files for a gait: usual ending, and the function that writes it, with the time between rows [ms].
 GAITS: Mapping[str, tuple[str, Callable[[Path, Result, int], None]]] = {
     **{name: (ending, partial(write_as, name)) for name, ending in FORMATS.items()},
@@ -113,5 +103,4 @@ GAITS: Mapping[str, tuple[str, Callable[[Path, Result, int], None]]] = {
 PROBLEMS: Mapping[str, Callable[[str, ProblemOptions, Path], Sequence[Path]]] = {
     "objective": _write_objective,
     "solver": _write_solver,
-    "nl": _write_nl,
 }

@@ -41,8 +41,8 @@ KEYS = ("variables", "lifted", "constraints", "equations", "jacobian", "hessian"
 SIZES_INTRODUCTION = """## Sizes of the NLPs
 
 What NLP solvers receive with default options: scaled variables and those of lifted operations, the lower triangle of the Hessian;
-measured by `python -m docs.nlp_sizes`. `nlp-gait export PROBLEM --to nl --out DIR` writes one as an `.nl` file,
-[for solver developers](../../control-engineer.md#nlps-for-solver-developers)."""
+measured by `python -m docs.nlp_sizes`. `nlp-gait export PROBLEM --to solver --out DIR` writes one as
+C++ [for control engineers](../../control-engineer.md#the-nlp)."""
 CATALOGUE = Path(__file__).parents[1] / "gaitbench.json"
 INSTANCES = """## Instances of GaitBench
 

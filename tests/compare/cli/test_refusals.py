@@ -64,7 +64,7 @@ REFUSED = {
     "export {gait} --to csv --set a=1": "leave out --set",
     "export {gait} --to csv --limit FrictionCone": "leave out --set and --limit",
     "export {gait} --to gif --out walk.avi": "must end in .gif",
-    "export nao-ssp --to nl": "name their folder by --out DIR",
+    "export nao-ssp --to solver": "name their folder by --out DIR",
     "export absent.json --to csv": "'absent.json' cannot be read",
     "export walk12-w15 --to objective --out {new}": "did you mean 'walk12-w015'",
     "simulate {gait} --torque-limits peak": "urdf, stall, continuous|'peak'",
