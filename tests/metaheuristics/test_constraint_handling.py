@@ -90,20 +90,12 @@ def test_epsilon_falls_to_zero_at_the_control_fraction() -> None:
     assert handling.rule(0.9, initial).order(f, v).tolist() == [1, 0, 2]
 
 
-def test_the_defaults_are_those_of_the_source() -> None:
+def test_epsilon_begins_at_the_violation_below_which_the_share_lies_and_ends_at_the_control_fraction() -> None:
     """Takahama and Sakai (2006): theta 0.2, cp 5, and here Tc = 0.8 T."""
     assert EpsilonLevel() == EpsilonLevel(share=0.2, exponent=5.0, control=0.8)
-
-
-def test_epsilon_takes_the_violation_below_which_the_share_lies() -> None:
     initial = np.array([1.0, 2.0, 3.0, 4.0])
     starts = [EpsilonLevel(share=share).epsilon(0.0, initial) for share in (0.0, 0.24, 0.25, 0.75, 1.0)]
-    assert starts == [1.0, 1.0, 2.0, 4.0, 4.0]
-    assert EpsilonLevel(share=1.0).epsilon(0.0, np.array([7.0])) == 7.0
-
-
-def test_epsilon_ends_at_the_control_fraction_and_not_before() -> None:
-    initial = np.ones(3)
+    assert starts == [1.0, 1.0, 2.0, 4.0, 4.0] and EpsilonLevel(share=1.0).epsilon(0.0, np.array([7.0])) == 7.0
     handling = EpsilonLevel(exponent=0.5, control=0.5)
     assert handling.epsilon(np.nextafter(0.5, 0.0), initial) > 0.0
     assert [handling.epsilon(progress, initial) for progress in (0.5, 0.75, 1.0)] == [0.0] * 3
