@@ -59,15 +59,14 @@ def evaluate(
     Examples: `nlp-gait evaluate nao-ssp --x 0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4`, also with `--rounded`,
     `nlp-gait evaluate nao-ssp --x points.csv --csv judged.csv`, `nlp-gait evaluate --motion gait.csv --robot nao-v5`
     """
-    if (x is None) == (motion is None):
-        fail("give a point with --x, or a motion with --motion")
     if claimed is not None and not rounded:
         fail("--claimed compares an objective with all points of --rounded; add --rounded")
     if rounded and motion is not None:
         fail("--rounded refers to the digits of --x; leave it out for a motion")
-    if x is None or motion is not None:
-        assert motion is not None  # one of both is given; for the type checker
+    if motion is not None and x is None:
         return _evaluate_motion(_read_motion(problem, motion, touch_down), engine, signals)
+    if x is None or motion is not None:
+        fail("give a point with --x, or a motion with --motion")
     loaded = problem.spec().load()
     many = x.endswith(".csv")
     if rounded:

@@ -163,18 +163,18 @@ def simulate(
     parts = [*_describe(report), *(() if walk is None else [_describe_course(walk, drive.feedback is None)])]
     if climb is not None:
         parts.append(_describe_climb(climb))
-    if not robustness:
-        return Output(data=data, parts=parts, written=written)
-    try:
-        survival = measure_robustness(plan, drive)
-    except KeyboardInterrupt:
-        where = "the simulation is " + ("printed" if folder is None else f"stored in {folder}")
-        sentence = f"interrupted in the tests of robustness; {where}"
-        return Output(data=data, parts=parts, written=written, interrupted=sentence)
-    data["robustness"] = asdict(survival)
-    if folder is not None:
-        write_json(folder / "report.json", replace_nan(data))
-    return Output(data=data, parts=[*parts, *_describe_survival(survival)], written=written)
+    interrupted = ""
+    if robustness:
+        try:
+            survival = measure_robustness(plan, drive)
+            data["robustness"] = asdict(survival)
+            parts += _describe_survival(survival)
+            if folder is not None:
+                write_json(folder / "report.json", replace_nan(data))
+        except KeyboardInterrupt:
+            where = "printed" if folder is None else f"stored in {folder}"
+            interrupted = f"interrupted in the tests of robustness; the simulation is {where}"
+    return Output(data=data, parts=parts, written=written, interrupted=interrupted)
 
 
 def _show_pictures(pictures: Iterator[Frame], count: int) -> Iterator[Frame]:

@@ -85,11 +85,9 @@ def solve(
         except OutputError as error:  # the solution is printed nevertheless
             failures = [str(error)]
     if stopped:
-        where = f"in {out}" if written else "printed"
-        return Output(
-            data=data, parts=parts, written=written, interrupted=f"{stopped}; the best point so far is {where}"
-        )
-    return Output(data=data, parts=parts, written=written, failures=failures)
+        stopped += f"; the best point so far is {f'in {out}' if written else 'printed'}"
+        failures = []
+    return Output(data=data, parts=parts, written=written, failures=failures, interrupted=stopped)
 
 
 def _describe(solution: Solution) -> Iterator[str | Rows]:
