@@ -118,6 +118,8 @@ def simulate(
 
         [feedback]                    # leave it out for open loop
         delay_s = 0.02
+
+    A table `[controller]` with `kp`, `kd` and `gravity_compensation` instead is a PD controller with equal gains of all joints.
     """
     from compare.drawing.robot_figures import plot_simulation
     from compare.report.interactive import animate_simulation

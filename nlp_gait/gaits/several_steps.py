@@ -12,7 +12,7 @@ from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import find_partners, mirror_sign
 from nlp_gait.symbolic.rotations import turn_quaternion
 
-JOINT_ARRAYS = ("q", "qd", "qdd", "tau")
+JOINT_ARRAYS = ("q", "qd", "qdd", "tau", "q_desired", "qd_desired")
 SIDES_SWAPPED = {
     f"{side}_{what}": f"{other}_{what}"
     for side, other in (("left", "right"), ("right", "left"))

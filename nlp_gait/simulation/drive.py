@@ -16,11 +16,13 @@ from nlp_gait.formulation import Array
 from nlp_gait.robots import Joint
 from nlp_gait.simulation.engine import check_period
 from nlp_gait.simulation.feedback import BalanceController, Feedback
+from nlp_gait.simulation.joint_controller import GravityCompensation, JointController
 from nlp_gait.simulation.plan import Plan
 
 # Published limits of NAO's joints differ by a factor of four: from the robot's file (the manufacturer's URDF), or from the motor
 # at stall or in continuous service, times the gear ratio.
 TORQUE_LIMITS = ("urdf", "stall", "continuous")
+UNLIMITED_NM = 1e6
 ROUNDING = 1e-9  # in periods: a set-point is valid from its own time
 INTERPOLATIONS = ("linear", "held")  # between two set-points
 FEED_FORWARD = ("torque", "velocity", "none")  # torque includes velocity
@@ -43,6 +45,7 @@ class Drive:
     feed_forward: str = "torque"  #: ``torque`` (and velocity), ``velocity``, or ``none``
     torque_limits: str = "urdf"  #: source of the limits
     feedback: Feedback | None = None  #: corrects the set-points; None for open loop
+    controller: JointController | None = None  #: gains instead of the motors' stiffness, on desired angles and rates
 
     def __post_init__(self) -> None:
         for name in ("full_error_rad", "time_constant_s", "period_s"):
@@ -55,14 +58,16 @@ class Drive:
             if getattr(self, name) not in names:
                 words = name.replace("_", " ")
                 raise InputError(f"{words} of a drive must be one of {', '.join(names)}, got {getattr(self, name)!r}")
+        if self.controller is not None and self.feedback is not None:
+            raise InputError("a drive has a controller or a feedback, not both; leave one out")
 
     def stiffness(self, joint: Joint) -> float:
         """Return the stiffness of a joint's drive [Nm/rad]."""
-        return find_stall_torque(joint) / self.full_error_rad
+        return find_stall_torque(joint) / self.full_error_rad if self.controller is None else self.controller.kp
 
     def damping(self, joint: Joint) -> float:
         """Return the damping of a joint's drive [Nm s/rad]."""
-        return self.stiffness(joint) * self.time_constant_s
+        return self.stiffness(joint) * self.time_constant_s if self.controller is None else self.controller.kd
 
     def set_points(self, sample: Callable[[str, Array], Array], times: Array, joints: Sequence[Joint]) -> Array:
         """Return the set-points at times (T,) [s] of joints, (T, J) [rad]: planned angles, shifted by the feed-forward.
@@ -71,9 +76,12 @@ class Drive:
         """
         before, share = np.divmod(times / self.period_s + ROUNDING, 1.0)
         last = int(before[-1]) + 1
-        sent = self._shift(
-            joints, *(sample(name, self.period_s * np.arange(last + 1.0)) for name in ("q", "qd", "tau"))
-        )
+        grid = self.period_s * np.arange(last + 1.0)
+        if self.controller is None:
+            sent = self._shift(joints, *(sample(name, grid) for name in ("q", "qd", "tau")))
+        else:
+            lead = self.controller.kd / self.controller.kp
+            sent = sample("q_desired", grid) + lead * sample("qd_desired", grid)
         k = before.astype(int)
         if self.interpolation == "held":
             return sent[k]
@@ -87,8 +95,10 @@ class Drive:
             return shifted
         return shifted + tau / np.array([self.stiffness(joint) for joint in joints])
 
-    def balance(self, plan: Plan, model: Any) -> BalanceController | None:
-        """Return the controller of one simulation, if the drive has a feedback."""
+    def balance(self, plan: Plan, model: Any) -> BalanceController | GravityCompensation | None:
+        """Return what corrects the set-points of one simulation, if the drive has a feedback or compensates gravity."""
+        if self.controller is not None and self.controller.gravity_compensation > 0.0:
+            return GravityCompensation(self.controller, plan, model)
         if self.feedback is None:
             return None
         joints = [plan.robot.joint(name) for name in plan.joints]
@@ -96,7 +106,9 @@ class Drive:
         return BalanceController(self.feedback, plan, stiffness, model)
 
     def torque_limit(self, joint: Joint) -> float:
-        """Return the torque limit of a joint [Nm]."""
+        """Return the torque limit of a joint [Nm]; the paper's controller has none."""
+        if self.controller is not None:
+            return UNLIMITED_NM
         if self.torque_limits == "urdf" or joint.motor is None:
             return joint.torque_limit_Nm
         if self.torque_limits == "stall":
@@ -112,7 +124,8 @@ def find_stall_torque(joint: Joint) -> float:
 def load_drive(name: str) -> Drive:
     """Return the drive of a name in ``DRIVES``, or of a TOML file.
 
-    The file has fields of ``Drive``, and those of ``Feedback`` in a table ``[feedback]``.
+    The file has fields of ``Drive``, and those of ``Feedback`` in a table ``[feedback]`` or of ``JointController`` in
+    a table ``[controller]``.
 
     Raises UnknownNameError, or InputError for a file or setting that is not allowed.
     """

@@ -112,8 +112,11 @@ class Plan:
     def at(self, name: str, times: Array) -> Array:
         """Return planned values at any times (T,) [s]: after the end, positions and torques stay, and rates are zero.
 
-        Names are ``q`` [rad], ``qd`` [rad/s], ``tau`` [Nm], ``zmp``, ``hip``, ``left_foot`` and ``right_foot`` [m].
+        Names are ``q`` [rad], ``qd`` [rad/s], ``tau`` [Nm], ``zmp``, ``hip``, ``left_foot`` and ``right_foot`` [m];
+        ``q_desired`` and ``qd_desired`` are what a controller follows, if that is not the motion itself.
         """
+        if name not in self.signals.arrays:
+            name = name.removesuffix("_desired")
         within = np.clip(times, 0.0, self.duration_s)
         if name in self._splines:
             return np.asarray(self._splines[name](within))
@@ -122,7 +125,8 @@ class Plan:
             return self.rate("q", times)
         # Torques jump where a foot lands or lifts, so a spline would overshoot.
         columns = [np.interp(within, samples["t"], column) for column in samples[name].T]
-        return np.stack(columns, axis=1)
+        values = np.stack(columns, axis=1)
+        return values * (times <= self.duration_s)[:, None] if name == "qd_desired" else values
 
     def rate(self, name: str, times: Array) -> Array:
         """Return planned rates of ``q``, ``zmp``, ``hip`` or a foot at any times (T,): zero after the end."""

@@ -10,12 +10,14 @@ import pytest
 import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result
-from nlp_gait.gaits.stairs.display import compute_ground_force
-from nlp_gait.gaits.stairs.planar_biped import MOVING
+from nlp_gait.gaits.stairs.display import compute_ground_force, compute_joint_torques
+from nlp_gait.gaits.stairs.planar_biped import MOVING, make_loads
 from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.joint_controller import GravityCompensation, JointController
 from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.shapes import Capsule, Prism, make_shapes
+from nlp_gait.simulation.simulate import Conditions, prepare
 
 pytest.importorskip("mujoco")
 
@@ -123,3 +125,17 @@ def test_a_lean_that_changes_gives_the_torso_a_spin() -> None:
 def test_a_step_that_does_not_end_as_it_began_is_not_repeated(climb: Result) -> None:
     with pytest.raises(InputError, match="'stairs-plan' is not a cycle that can be repeated"):
         make_plan(climb, 2)
+
+
+def test_gravity_is_compensated_by_the_torques_that_hold_the_posture_over_the_foremost_foot(climb: Result) -> None:
+    plan, controller = make_plan(climb), JointController(kp=100.0, kd=10.0, gravity_compensation=0.5)
+    model, data = prepare(plan, Conditions(), Drive(controller=controller), "rectangle")
+    compensation = GravityCompensation(controller, plan, model)
+    links = climb.problem.signals(climb.x).arrays["link_q"][:1].T
+    still, nothing = np.zeros((len(MOVING), 1)), np.zeros((2, 1))
+    held = np.array(make_loads("T", "S")(links, still, still, nothing, nothing)[0]).T
+    expected = compute_joint_torques(held, np.zeros(1))[0]
+    joints = [i for i, name in enumerate(plan.joints) if name != "LToe"]  # which carries no weight behind the foot
+    np.testing.assert_allclose(compensation.hold(data)[joints], expected[joints], atol=1e-6)
+    shift = compensation.correct(np.zeros(len(plan.joints)), data)
+    np.testing.assert_allclose(shift[joints], 0.5 * expected[joints] / 100.0, atol=1e-8)

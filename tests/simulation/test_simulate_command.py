@@ -12,11 +12,12 @@ from typer.testing import CliRunner
 import nlp_gait
 from compare.cli import app
 from nlp_gait.formulation import GaitProblem, Result
+from nlp_gait.gaits.stairs.track import PLAN
 
 mujoco = pytest.importorskip("mujoco")
 pytestmark = pytest.mark.slow  # each gait is simulated
 
-from nlp_gait.simulation.drive import Drive  # noqa: E402
+from nlp_gait.simulation.drive import Drive, load_drive  # noqa: E402
 from nlp_gait.simulation.measurements import Measurements, measure, measure_climb  # noqa: E402
 from nlp_gait.simulation.plan import SIDES, Plan, make_plan  # noqa: E402
 from nlp_gait.simulation.simulate import Conditions, Simulation, prepare, simulate_plan  # noqa: E402
@@ -92,6 +93,24 @@ def test_tracked_steps_climb_with_stiff_gains_and_fall_with_the_papers() -> None
     assert not simulate(problem, TRACKED)[2].fallen
     loose = problem.with_values(gravity_compensation=0.0)
     assert simulate(loose, PAPERS_GAINS)[2].fallen
+
+
+@pytest.mark.parametrize(
+    ("gains", "share", "fallen", "climbed"),
+    [(PAPERS_GAINS, 0, True, 0), ((2000.0, 200.0, 1.318), 0, False, 0), ((2000.0, 200.0, 1.318), 1, False, 1)],
+)
+def test_the_papers_controller_climbs_with_stiff_gains_and_gravity_compensated(
+    tmp_path: Path, gains: tuple[float, ...], share: int, fallen: bool, climbed: int
+) -> None:
+    names = nlp_gait.load("stairs-plan").names
+    plan = {name: x for name, x in zip(names, LIMITED, strict=True) if name in PLAN}
+    problem = nlp_gait.load("stairs-track").with_values(**plan)
+    drive = tmp_path / "paper.toml"
+    kp, kd, _ = gains
+    drive.write_text(f"[controller]\nkp = {kp}\nkd = {kd}\ngravity_compensation = {share}\n")
+    reference = make_plan(Result(problem=problem, x=problem.check_x(gains)))
+    trace = simulate_plan(reference, drive=load_drive(str(drive)))
+    assert ((trace.fell_at_s is not None), measure_climb(reference, trace).climbed) == (fallen, climbed)
 
 
 def test_the_command_simulates_them_and_names_what_is_not_repeated(tmp_path: Path) -> None:

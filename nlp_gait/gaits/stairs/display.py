@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel
+from nlp_gait.formulation import Array, Columns, NumericPoint, Signals, SimulationModel
 from nlp_gait.formulation.display import LEFT, RIGHT, SIMULATED, TRUNK, Limb, Skeleton, Tread
 from nlp_gait.gaits.several_steps import repeat_steps
 from nlp_gait.gaits.stairs import planar_biped as biped
@@ -159,6 +159,7 @@ class StepMotion(NamedTuple):
     tau: Array  # (T, 8) of the robot's joints [Nm]
     pressure: Array  # (T,) centre of pressure of both feet, ahead of the stance ankle [m]
     double_support_s: float  # duration of load on the rear foot, finally on its toe
+    desired: Array | None = None  # (T, 18) angles and rates of the links that a controller follows; None for q and qd
 
 
 def make_simulation_model(
@@ -237,7 +238,11 @@ def make_signals(step: StepMotion, rise: float) -> Signals:
         "left_bears": np.ones((len(step.t), 1)),
         "right_bears": rear[:, None].astype(float),
     }
-    return Signals(joints=JOINTS, arrays=arrays, columns=SIMULATED)
+    if step.desired is not None:
+        q, qd = np.split(step.desired, 2, axis=1)
+        arrays |= {"q_desired": compute_joint_angles(q), "qd_desired": compute_joint_angles(qd, rates=True)}
+    followed = {"q_desired": Columns(unit="rad", labels=JOINTS), "qd_desired": Columns(unit="rad/s", labels=JOINTS)}
+    return Signals(joints=JOINTS, arrays=arrays, columns=SIMULATED | followed)
 
 
 def _compute_stance_toe_torque(load: Array, pressure: Array) -> Array:

@@ -198,7 +198,10 @@ class TrackedStep:
         arrays = self.compute_signals(at).arrays
         state = np.hstack([arrays["link_q"], arrays["link_qd"]])
         on_links = arrays["tau"] @ self.loop.joints.full()
-        return make_driven_step(arrays["t"], state, on_links, arrays["zmp"], float(at["t2_s"]))
+        desired = np.hstack([arrays[name] for name in ("q_desired", "qd_desired")])
+        followed = np.hstack([half @ np.linalg.inv(self.loop.joints.full().T) for half in np.split(desired, 2, axis=1)])
+        step = make_driven_step(arrays["t"], state, on_links, arrays["zmp"], float(at["t2_s"]))
+        return step._replace(desired=followed)
 
 
 def compute_support(point: Point, loop: closed_loop.ClosedLoop) -> tuple[MX, MX]:
