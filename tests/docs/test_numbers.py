@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from docs.pages.numbers import format_numbers, list_substitutions, parse_table, read_numbers
+from nlp_gait.proofs.certificate import load_certificates
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {path.relative_to(DOCS).as_posix(): path for path in (*DOCS.glob("*.md"), *DOCS.glob("model/*.md"))}
@@ -54,3 +56,11 @@ def test_the_file_is_what_the_module_writes() -> None:
     numbers = read_numbers()
     assert tomllib.loads(format_numbers(numbers)) == numbers
     assert parse_table(["title", "| a | b |", "|---|--:|", "| 1 | 2 m |"]) == (["a", "b"], [["1", "2 m"]])
+
+
+@pytest.mark.parametrize(("phase", "instance"), [("nao_ssp", "ssp-v5"), ("nao_dsp", "dsp-v5")])
+def test_stated_bounds_are_those_of_the_certificates(phase: str, instance: str) -> None:
+    """A lower bound is rounded down, so that the statement is proven, too; a best known value is rounded to nearest."""
+    numbers, certificate = read_numbers()["number"], load_certificates()[instance].certificate
+    assert numbers[f"{phase}_bound"]["value"] == f"{math.floor(certificate.bound * 1e7) / 1e7:.7f}"
+    assert numbers[f"{phase}_best"]["value"] == f"{certificate.objective:.7f}"
