@@ -35,6 +35,12 @@ def override(path: str, **record: object) -> str:
     return path
 
 
+def name_feet(joint: str) -> dict[str, object]:
+    """Soles on the links behind a joint of each leg."""
+    extents = {"ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04}
+    return {side: {"link": f"{x}_{joint}_link", **extents} for side, x in (("left", "A"), ("right", "B"))}
+
+
 def test_feet_soles_and_sides_are_found_by_geometry(robot: Robot) -> None:
     left, right = robot.feet["left"], robot.feet["right"]
     assert (left.link, right.link) == ("A_ankle_roll_link", "B_ankle_roll_link")
@@ -136,9 +142,7 @@ def test_a_mesh_is_needed_only_where_a_sole_comes_from_it(tmp_path: Path) -> Non
     foot = load_robot(path).feet["left"]
     assert foot.front_m + foot.back_m == pytest.approx(0.2)
     (folder / "sole.stl").unlink()
-    extents = {"ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04}
-    feet = {side: {"link": f"{letter}_ankle_roll_link", **extents} for side, letter in (("left", "A"), ("right", "B"))}
-    assert load_robot(override(path, feet=feet)).feet["right"].back_m == 0.05
+    assert load_robot(override(path, feet=name_feet("ankle_roll"))).feet["right"].back_m == 0.05
 
 
 def change(old: str, new: str) -> Callable[[str], str]:
@@ -275,7 +279,5 @@ def test_an_impossible_posture_is_refused(tmp_path: Path, posture: dict[str, flo
 
 
 def test_five_joints_are_no_leg(tmp_path: Path) -> None:
-    extents = {"ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04}
-    feet = {side: {"link": f"{x}_ankle_pitch_link", **extents} for side, x in (("left", "A"), ("right", "B"))}
     with pytest.raises(GaitError, match=r"left leg must have 6 turning joints .* got 5"):
-        make_biped_model(load_robot(override(crooked(tmp_path), feet=feet)))
+        make_biped_model(load_robot(override(crooked(tmp_path), feet=name_feet("ankle_pitch"))))
