@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,7 +15,6 @@ from nlp_gait.errors import RobotDataError
 from nlp_gait.robots import limits, load_robot
 from nlp_gait.robots.meshes import read_mesh_points
 from nlp_gait.robots.mjcf import read_mjcf
-from nlp_gait.robots.urdf import read_urdf
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory exist on Linux")
 
@@ -71,34 +72,38 @@ def test_a_model_that_takes_too_much_is_rejected(tmp_path: Path, text: str, smal
     assert time.monotonic() - began < TIME_S + SLACK_S  # far less than the limit of 60 s
 
 
-@pytest.mark.slow
-def test_a_collada_file_with_many_instances_is_rejected(tmp_path: Path) -> None:
-    file = tmp_path / "bomb.dae"
-    file.write_text(
-        '<COLLADA><library_geometries><geometry id="g"><mesh><source id="s"><float_array>'
-        + "0 1 2 " * 1000
-        + '</float_array></source><vertices><input semantic="POSITION" source="#s"/></vertices></mesh></geometry>'
-        "</library_geometries><library_visual_scenes><visual_scene><node>"
-        + '<instance_geometry url="#g"/>' * 20_000
-        + "</node></visual_scene></library_visual_scenes></COLLADA>"
-    )
-    with pytest.raises(RobotDataError, match="more than 4000000 points; simplify it"):
-        read_mesh_points(file)
+COLLADA = (
+    '<COLLADA><library_geometries><geometry id="g"><mesh><source id="s"><float_array>'
+    + "0 1 2 " * 1000
+    + "</float_array>"
+    '</source><vertices><input semantic="POSITION" source="#s"/></vertices></mesh></geometry></library_geometries>'
+    "<library_visual_scenes><visual_scene><node>" + '<instance_geometry url="#g"/>' * 20_000 + "</node></visual_scene>"
+    "</library_visual_scenes></COLLADA>"
+)
+CHAIN = "".join(f'<link name="a{k}"/><joint name="j{k}" type="fixed"/>' for k in range(20_000))
+JOINTS = '<body><joint/><geom size="1"/></body>'
 
 
 @pytest.mark.slow
-def test_a_urdf_with_a_long_chain_is_rejected(tmp_path: Path) -> None:
-    file = tmp_path / "chain.urdf"
-    links = "".join(f'<link name="a{k}"/><joint name="j{k}" type="fixed"/>' for k in range(20_000))
-    file.write_text(f'<robot name="r">{links}</robot>')
-    with pytest.raises(ValueError, match="it has 40000 links and joints, more than 2000; simplify the file"):
-        read_urdf(str(file))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("joints", [401, 900])
-def test_a_robot_with_many_joints_is_rejected(tmp_path: Path, joints: int) -> None:
-    file = tmp_path / "joints.xml"
-    file.write_text(_write_model(body='<body><joint/><geom size="1"/></body>' * joints))
-    with pytest.raises(RobotDataError, match=f"has {joints} turning joints, more than 400; remove"):
-        load_robot(str(file))
+@pytest.mark.parametrize(
+    ("read", "name", "text", "message"),
+    [
+        (read_mesh_points, "bomb.dae", COLLADA, "more than 4000000 points; simplify it"),
+        (
+            load_robot,
+            "chain.urdf",
+            f'<robot name="r">{CHAIN}</robot>',
+            "has 40000 links and joints, more than 2000; simplify",
+        ),
+        (load_robot, "joints.xml", _write_model(body=JOINTS * 401), "has 401 turning joints, more than 400; remove"),
+        (load_robot, "joints.xml", _write_model(body=JOINTS * 900), "has 900 turning joints, more than 400; remove"),
+    ],
+    ids=["instances of a shape", "links", "401 joints", "900 joints"],
+)
+def test_what_is_too_long_is_rejected(
+    tmp_path: Path, read: Callable[[Any], object], name: str, text: str, message: str
+) -> None:
+    file = tmp_path / name
+    file.write_text(text)
+    with pytest.raises(RobotDataError, match=message):
+        read(file if read is read_mesh_points else str(file))

@@ -9,7 +9,6 @@ from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import pytest
-from rich.console import Console
 
 from compare.analysis.comparison import compare_problems
 from compare.cli import printing
@@ -136,26 +135,19 @@ def test_the_terminal_shows_control_characters_and_markup(text: str, shown: str)
     assert out.getvalue() == shown
 
 
-def test_tables_and_errors_show_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    out = io.StringIO()
-    console: Console = PlainConsole(file=out, markup=False, highlight=False, width=200)
-    monkeypatch.setattr(printing, "stdout", console)
-    monkeypatch.setattr(printing, "stderr", console)
+def test_tables_errors_and_progress_show_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row's name, ``torque_change[LKneePitch, 3]``, would be taken for markup and vanish; ``[/]`` would be an error."""
+    out, bar = io.StringIO(), io.StringIO()
+    for stream in ("stdout", "stderr"):
+        monkeypatch.setattr(printing, stream, PlainConsole(file=out, markup=False, highlight=False, width=200))
     printing.print_table("[red]title\x1b[31m", ("a[/]", "b\x07"), [("\x1b[2J", "[blue]")])
     with pytest.raises(printing.typer.Exit):
         printing.fail("no file 'a\x1b[31m\nb'")
     text = out.getvalue()
-    assert "\x1b" not in text and "\x07" not in text
-    for part in (r"[red]title\x1b[31m", "a[/]", r"\x1b[2J", "[blue]"):
-        assert part in text
-    assert text.endswith("nlp-gait: no file 'a\\x1b[31m b'\n")
-
-
-def test_progress_shows_names_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A row's name, ``torque_change[LKneePitch, 3]``, would be taken for markup and vanish; ``[/]`` would be an error."""
-    out = io.StringIO()
-    monkeypatch.setattr(printing, "stderr", PlainConsole(file=out, force_terminal=True, width=200))
+    assert all(shown in text for shown in (r"[red]title\x1b[31m", "a[/]", r"\x1b[2J", "[blue]"))
+    assert "\x1b" not in text and "\x07" not in text and text.endswith("nlp-gait: no file 'a\\x1b[31m b'\n")
+    monkeypatch.setattr(printing, "stderr", PlainConsole(file=bar, force_terminal=True, width=200))
     with printing.show_progress("[/] runs\x1b[2J", 2) as advance:
         advance("torque_change[LKneePitch, 3] [/]\x1b[2J")
-    assert "[/] runs" in out.getvalue() and "\x1b[2J" not in out.getvalue()
-    assert "torque_change[LKneePitch, 3]" in out.getvalue()
+    assert "[/] runs" in bar.getvalue() and "\x1b[2J" not in bar.getvalue()
+    assert "torque_change[LKneePitch, 3]" in bar.getvalue()

@@ -44,14 +44,10 @@ def test_no_file_of_the_working_folder_runs(tmp_path: Path) -> None:
     for name in loaded:
         (bait / f"{name}.py").write_text(f"open('{tmp_path}/ran-{name}', 'w')\n", encoding="utf-8")
     for call in CALLS:
-        _run(bait, "-P", "-c", PROGRAM, *call)
+        command = [sys.executable, "-P", "-c", PROGRAM, *call]
+        done = subprocess.run(command, cwd=bait, capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0, done.stderr
     assert not list(tmp_path.glob("ran-*"))
-
-
-def _run(folder: Path, *arguments: str) -> str:
-    done = subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 def test_programs_of_user_code_find_their_modules(monkeypatch: pytest.MonkeyPatch) -> None:

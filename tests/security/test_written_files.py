@@ -6,6 +6,7 @@ import csv
 import io
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,22 +20,23 @@ from nlp_gait.files import format_csv, replace_file, write_text
 from nlp_gait.formulation import Signals
 from nlp_gait.simulation.video import write_video
 
+SIGNALS = Signals(joints=("a",), arrays={"q": np.zeros((2, 1))}, columns={})
+WRITERS: dict[str, Callable[[Path], object]] = {
+    ".txt": lambda path: write_text(path, "new"),
+    ".npz": lambda path: write_npz(path, SIGNALS),
+    ".gif": lambda path: write_video(path, [np.zeros((8, 8, 3), dtype=np.uint8)] * 2, 10.0),
+    ".png": lambda path: save(Figure(figsize=(1, 1)), path.with_suffix("")),
+}
+
 
 @pytest.mark.parametrize("dangling", [False, True])
-@pytest.mark.parametrize("suffix", [".txt", ".npz", ".gif", ".png"])
+@pytest.mark.parametrize("suffix", WRITERS)
 def test_no_writer_follows_a_link(tmp_path: Path, suffix: str, dangling: bool) -> None:
     theirs, link = tmp_path / "theirs", tmp_path / f"ours{suffix}"
     if not dangling:
         theirs.write_text("untouched")
     link.symlink_to(theirs)
-    if suffix == ".txt":
-        write_text(link, "new")
-    elif suffix == ".npz":
-        write_npz(link, Signals(joints=("a",), arrays={"q": np.zeros((2, 1))}, columns={}))
-    elif suffix == ".gif":
-        write_video(link, [np.zeros((8, 8, 3), dtype=np.uint8)] * 2, 10.0)
-    else:
-        save(Figure(figsize=(1, 1)), link.with_suffix(""))
+    WRITERS[suffix](link)
     assert not theirs.exists() if dangling else theirs.read_text() == "untouched"
     assert not link.is_symlink() and link.stat().st_size > 0
     assert not list(tmp_path.glob(".*"))
