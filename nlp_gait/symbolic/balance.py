@@ -1,6 +1,5 @@
-"""Zero-moment point, and the limits of the wrench between a sole and the ground."""
+"""Zero-moment point, and the wrench between a sole and the ground."""
 
-import math
 from collections.abc import Sequence
 
 import casadi as ca
@@ -10,8 +9,6 @@ from nlp_gait.symbolic.dynamics import Wrench
 
 # In free fall there is no ZMP. With at least this share of the weight as ground force it is far outside any sole, and finite.
 LEAST_LOAD = 1e-3
-# Static friction that is commonly required of a walkway (UL 410); rubber on a dry floor has more.
-SOLE_FRICTION = 0.5
 
 
 def zmp_of_wrench(wrench: Wrench, height: float, weight: float) -> SX:
@@ -36,47 +33,6 @@ def ground_load(wrench: Wrench, weight: float) -> SX:
 def shift_down(wrench: Wrench, height: float) -> SX:
     """Return the wrench (6,) about the point a height [m] below its reference point [N, Nm]."""
     return ca.vertcat(wrench.force, wrench.moment + ca.cross(SX(DM([0.0, 0.0, height])), wrench.force))
-
-
-def shift_up(wrench: SX, height: float) -> Wrench:
-    """Return a wrench (6,) about the point a height [m] above its reference point."""
-    force, moment = ca.vertsplit(wrench, 3)
-    return Wrench(force, moment - ca.cross(SX(DM([0.0, 0.0, height])), force))
-
-
-def sole_limits(wrench: SX, along: tuple[float, float], across: tuple[float, float], friction: SX) -> tuple[SX, SX, SX]:
-    """Return what must not be negative for flat ground to exert a wrench on a rectangular sole by pressure and friction.
-
-    All are linear in the wrench; together they also imply that the ground does not pull. The friction cone is replaced by the
-    pyramid inside it, with sides along and across.
-
-    Args:
-        wrench: (6,) of the ground on the sole, about a point of the sole [N, Nm].
-        along: from that point to the back and the front edge [m], the back edge negative.
-        across: to the right and the left edge [m], the right edge negative.
-        friction: coefficient of Coulomb's friction.
-
-    Returns:
-        (4,) friction [N], (4,) centre of pressure within the edges, as moments [Nm], (8,) turning about the vertical [Nm].
-
-    Source:
-        Caron, Pham, Nakamura (2015), "Stability of surface contacts for humanoid robots: closed-form formulae of the contact
-        wrench cone for rectangular support areas", with its absolute values as pairs of rows; (B.11) to (B.13) in docs/model.
-    """
-    mu = friction / math.sqrt(2.0)
-    fx, fy, fz, nx, ny, nz = ca.vertsplit(wrench)
-    x, y = (along[1] - along[0]) / 2, (across[1] - across[0]) / 2
-    middle_x, middle_y = sum(along) / 2, sum(across) / 2
-    roll, pitch, turn = nx - middle_y * fz, ny + middle_x * fz, nz - middle_x * fy + middle_y * fx
-    rubbing = [mu * fz + sign * force for force in (fx, fy) for sign in (1, -1)]
-    pressing = [edge * fz + sign * moment for edge, moment in ((y, roll), (x, pitch)) for sign in (1, -1)]
-    turning = [
-        mu * (x + y) * fz + sense * turn + first * (y * fx - sense * mu * roll) + second * (x * fy - sense * mu * pitch)
-        for sense in (1, -1)
-        for first in (1, -1)
-        for second in (1, -1)
-    ]
-    return ca.vertcat(*rubbing), ca.vertcat(*pressing), ca.vertcat(*turning)
 
 
 def combine_zmps(zmps: Sequence[SX], ground_loads: Sequence[SX]) -> SX:

@@ -66,7 +66,6 @@ def newton_euler(
     gravity: float | tuple[float, float, float],
     shares: Mapping[str, SX] | None = None,
     upright: Collection[str] = (),
-    pushes: Mapping[str, Wrench] | None = None,
 ) -> tuple[dict[str, SX], Wrench]:
     """Return the joint torques of a tree whose first body is fixed to the ground.
 
@@ -78,7 +77,6 @@ def newton_euler(
         gravity: magnitude, acting along -z, or the vector (3,) [m/s^2].
         shares: factors on mass and inertia of links by name, for a link that two trees carry together.
         upright: links that do not turn, which saves operations.
-        pushes: other wrenches on links by name, about their reference points and in their axes.
 
     Returns:
         Torques by joint name [Nm], and the wrench of the ground on the first body about its reference point.
@@ -89,7 +87,7 @@ def newton_euler(
         shared as Khalil and Kleinfinger (1987) do. Rotors add their inertia at the joint times its acceleration, without
         gyroscopic torques: Featherstone (2008), section 9.6. Equations (D.1) to (D.9) in docs/model.
     """
-    shares, pushes = shares or {}, pushes or {}
+    shares = shares or {}
     rotations = [relative_rotation(body, q) for body in tree]
     moved: list[tuple[SX, SX, SX, SX]] = []  # spin, its rate, turning and acceleration of each body
     wrenches: list[Wrench] = []  # that the motion of each body needs, about its reference point, in its axes
@@ -114,8 +112,6 @@ def newton_euler(
         moment = ca.cross(SX(DM(inertia.first)), acceleration) + _compute_moment(turning, DM(inertia.second))
         if body.link.name in shares:  # force and moment are linear in mass and inertia
             force, moment = force * shares[body.link.name], moment * shares[body.link.name]
-        if body.link.name in pushes:  # its joint does not transmit them
-            force, moment = force - pushes[body.link.name].force, moment - pushes[body.link.name].moment
         wrenches.append(Wrench(force, moment))
     return _pass_down(tree, rotations, wrenches, qdd), wrenches[0]
 

@@ -34,7 +34,6 @@ OTHER: dict[str, Any] = {
     "limits": "FrictionCone",
     "drive_limits": False,
     "angle_limits": False,
-    "load_degree": 3,
     "duration_s": 3.0,
     "instance": "walk12-w100",
     "tracking_limit": False,

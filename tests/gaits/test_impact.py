@@ -9,7 +9,7 @@ from nlp_gait.formulation import Array, GaitProblem, Grid, Signals, load
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.cycle import make_walking_cycle
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.load_sharing import share_load
+from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.humanoid.body import make_humanoid
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.robots import Robot
@@ -52,8 +52,8 @@ def measure(robot: Robot, signals: Signals, sample: int) -> tuple[float, Array]:
 
 def list_phases(problem: GaitProblem, body: Body, x: Array) -> list[Signals]:
     """Return both phases, each with its sample at the switch."""
-    sharing = share_load(body, "lever")
-    cycle = make_walking_cycle(body, sharing, Grid(intervals=10), Goal(), at_given_speed=False, landing="inelastic")
+    loads = make_divided_loads(body, "lever")
+    cycle = make_walking_cycle(body, loads, Grid(intervals=10), Goal(), at_given_speed=False, landing="inelastic")
     return [phase.signals(problem.at(x)) for phase in cycle.phases.values()]
 
 

@@ -13,6 +13,6 @@ From a robot to the first constraint, in reading order:
     Assembly  objective, rows and indexes of a problem (``nlp_gait.formulation``)
 
 ``support_phases.py`` composes a phase, ``cycle.py`` joins both; ``phase_problem.py`` makes the problem.
-``load_sharing.py`` divides the load between two standing feet. ``nao/joint_phase.py`` is a phase whose joints' motion is given,
+``nao/joint_phase.py`` is a phase whose joints' motion is given,
 free or recorded.
 """

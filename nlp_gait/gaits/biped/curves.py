@@ -107,12 +107,11 @@ def make_grid(
     intervals: int,
     samples_per_interval: int,
     *,
-    planned_loads: bool = False,
     rule: Quadrature = "trapezoid",
 ) -> Grid:
-    """Return the samples of a phase; 0 in an interval stands for as many as suit the trajectory and the loads."""
+    """Return the samples of a phase; 0 in an interval stands for as many as suit the trajectory."""
     if samples_per_interval == 0 and not isinstance(samples_per_interval, bool):
-        samples_per_interval = SPLINE_SAMPLES if planned_loads or trajectory != "cubic" else SAMPLES
+        samples_per_interval = SPLINE_SAMPLES if trajectory != "cubic" else SAMPLES
     return Grid(
         intervals=intervals,
         samples_per_interval=samples_per_interval,

@@ -25,12 +25,11 @@ from nlp_gait.gaits.biped.cycle_motion import (
 )
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.impact import Impact
-from nlp_gait.gaits.biped.limits import BalanceMargins, Box, Limit, compute_margins, make_rows
-from nlp_gait.gaits.biped.load_sharing import LoadSharing
+from nlp_gait.gaits.biped.limits import BalanceMargins, Box, compute_margins, make_rows
 from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
-from nlp_gait.gaits.biped.samples import Loader, Planner
+from nlp_gait.gaits.biped.samples import Loader
 from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, TORQUE_JUMP, MotionSection, Sequence, Switch
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
@@ -133,30 +132,26 @@ class WalkingCycle(Sequence):
 
 
 def make_walking_cycle(
-    body: Body, sharing: LoadSharing, grid: Grid, goal: Goal, *, at_given_speed: bool, landing: Landing = "soft"
+    body: Body, loads: Loader, grid: Grid, goal: Goal, *, at_given_speed: bool, landing: Landing = "soft"
 ) -> WalkingCycle:
     """Return both phases of the cycle, joined, each with the goal; at a given speed the step length follows from it."""
     inelastic = landing == "inelastic"
-    *motion, step = make_cycle_variables(body, inelastic)
-    variables = (*motion, *sharing.variables, step)
+    variables = make_cycle_variables(body, inelastic)
     plans, margins = make_cycle_planners(body, inelastic), make_cycle_margins(body)
-    ingredients: dict[Support, tuple[Planner, Loader, tuple[Limit, ...]]] = {
-        Support.SINGLE: (plans[Support.SINGLE], make_single_support_loads(body), ()),
-        Support.DOUBLE: (sharing.add_to(plans[Support.DOUBLE]), sharing.loads, sharing.limits),
-    }
+    loaders = {Support.SINGLE: make_single_support_loads(body), Support.DOUBLE: loads}
     phases = {
-        name: Phase(
+        kind: Phase(
             body=body,
             variables=variables,
-            duration=TIMES[name],
-            plan=plan,
-            loads=loads,
+            duration=TIMES[kind],
+            plan=plans[kind],
+            loads=loader,
             grid=grid,
-            limits=(*make_phase_limits(body, margins[name]), *body.motors.limits, *load_limits),
+            limits=(*make_phase_limits(body, margins[kind]), *body.motors.limits),
             goal=goal,
-            standing=name.standing,
+            standing=kind.standing,
         )
-        for name, (plan, loads, load_limits) in ingredients.items()
+        for kind, loader in loaders.items()
     }
     touch_down = Impact(name="touch_down") if inelastic else Switch(name="touch_down")
     return WalkingCycle(
@@ -180,12 +175,12 @@ def make_cycle_margins(body: Body) -> dict[Support, BalanceMargins]:
 
 
 def plan_cycle(
-    body: Body, grid: Grid, objective: CycleObjective, sharing: LoadSharing, landing: Landing = "soft"
+    body: Body, grid: Grid, objective: CycleObjective, loads: Loader, landing: Landing = "soft"
 ) -> GaitProblem:
     """Return the problem of a walking cycle; for the options see ``gaits.nao``."""
     at_given_speed = objective != "energy-per-metre"
     goal = make_goal(body, "torque" if objective == "torque" else "power")
-    cycle = make_walking_cycle(body, sharing, grid, goal, at_given_speed=at_given_speed, landing=landing)
+    cycle = make_walking_cycle(body, loads, grid, goal, at_given_speed=at_given_speed, landing=landing)
     names = tuple(variable.name for variable in cycle.decisions)
 
     def reach(point: Point) -> MX:
@@ -194,7 +189,7 @@ def plan_cycle(
         )
 
     drawn = at_given_speed or landing == "inelastic"
-    start = sharing.start(names, partial(draw_start, names) if drawn else None)
+    start: Start | None = partial(draw_start, names) if drawn else None
     if not body.closed_form:
         usual = [make_usual_bounds(body, variable) for variable in cycle.decisions]
         start = make_start_within_reach(usual, (SPEED,) if at_given_speed else (), reach, start)

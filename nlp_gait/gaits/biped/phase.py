@@ -277,17 +277,17 @@ class Phase:
         inputs, plan = planned
         of_motion = [name for name in names if name in OF_MOTION or name in plan.quantities]
         of_loads = [name for name in names if name not in {*of_motion, *ALL_JOINTS}]
-        world = [plan.hip, *plan.ankles.values(), plan.wrench, plan.yaw]
+        world = [plan.hip, *plan.ankles.values(), plan.yaw]
         outputs = [*_stack_motions(plan, self.body.joints), ca.vertcat(*world)]
         outputs += [self.measure(name, plan) for name in of_motion]
         motion = ca.Function("motion", inputs, outputs)
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
         given = SX.sym("world", ca.vertcat(*world).shape[0])
         ends = np.cumsum([0, *(vector.shape[0] for vector in world)]).tolist()
-        hip, left, right, wrench, yaw = ca.vertsplit(given, ends)
+        hip, left, right, yaw = ca.vertsplit(given, ends)
         moved = {name: Motion(*(order[i] for order in parts)) for i, name in enumerate(self.moving)}
         joints = {**self._exact_plan[1].joints, **moved}
-        now = self.loads(Instant(joints=joints, hip=hip, ankles={"L": left, "R": right}, wrench=wrench, yaw=yaw))
+        now = self.loads(Instant(joints=joints, hip=hip, ankles={"L": left, "R": right}, yaw=yaw))
         loads = ca.Function("loads", [*parts, given], [self.measure(name, now) for name in of_loads])
         return Stages(motion, loads, of_motion, of_loads, tuple(names))
 

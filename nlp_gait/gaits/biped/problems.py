@@ -6,7 +6,7 @@ from nlp_gait.formulation import GaitProblem, Grid
 from nlp_gait.formulation.assembly import Quadrature
 from nlp_gait.gaits.biped.body import Body, Support
 from nlp_gait.gaits.biped.curves import Trajectory, make_grid
-from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, TorsoShare, share_load
+from nlp_gait.gaits.biped.loads import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal, make_phase_problem
 from nlp_gait.gaits.biped.support_phases import make_support_phase
@@ -20,10 +20,9 @@ class SampleOptions:
     samples_per_interval: int = 0
     rule: Quadrature = "trapezoid"
 
-    def make_grid(self, trajectory: Trajectory = "cubic", torso_share: TorsoShare = "printed") -> Grid:
-        """Return the samples, which suit trajectory and loads."""
-        planned = torso_share == "free"
-        return make_grid(trajectory, self.intervals, self.samples_per_interval, planned_loads=planned, rule=self.rule)
+    def make_grid(self, trajectory: Trajectory = "cubic") -> Grid:
+        """Return the samples, which suit the trajectory."""
+        return make_grid(trajectory, self.intervals, self.samples_per_interval, rule=self.rule)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +36,9 @@ class PhaseOptions(SampleOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class LoadOptions:
-    """Load of double support, see ``load_sharing``."""
+    """Load of double support, see ``loads.share_torso``."""
 
-    torso_share: TorsoShare = "lever"
-    load_degree: int = LOAD_DEGREE
+    torso_share: Division = "lever"
 
 
 def make_support_problem(
@@ -48,10 +46,8 @@ def make_support_problem(
 ) -> GaitProblem:
     """Return the problem of single support, or of double support with its loads."""
     step_m, goal = body.check_step_length(options.step_length_m), make_goal(body, options.objective)
-    if loads is None:
-        kind, words, sharing, grid = Support.SINGLE, "single", None, options.make_grid(options.trajectory)
-    else:
-        kind, words, sharing = Support.DOUBLE, "double", share_load(body, loads.torso_share, loads.load_degree)
-        grid = options.make_grid(options.trajectory, loads.torso_share)
-    phase = make_support_phase(body, kind, step_m, options.trajectory, grid, goal, sharing, derivatives)
+    kind, words = (Support.SINGLE, "single") if loads is None else (Support.DOUBLE, "double")
+    loader = None if loads is None else make_divided_loads(body, loads.torso_share)
+    grid = options.make_grid(options.trajectory)
+    phase = make_support_phase(body, kind, step_m, options.trajectory, grid, goal, loader, derivatives)
     return make_phase_problem(kind, f"{words} support: least mean power", phase)

@@ -24,8 +24,6 @@ class Instant(NamedTuple):
     hip: SX  # (3,) position of the torso's origin [m]
     ankles: Mapping[str, SX]  # (3,) positions by side ``"L"``, ``"R"`` [m]
     reach: SX = SX(0, 1)  # (2,) cosines of the left and the right knee
-    # (6,) of the ground on the right sole, about the point under its ankle [N, Nm]; empty unless planned
-    wrench: SX = SX(0, 1)
     yaw: SX = SX(0, 1)  # (1,) yaw of the right foot, from the left one's [rad]; empty where both point forward
     miss: SX = SX(0, 1)  # (k,) distances by which legs miss their feet [m]; empty where they cannot
     attitude: SX = SX(0, 1)  # (4,) of the torso, a unit quaternion (w, x, y, z); empty where it is upright

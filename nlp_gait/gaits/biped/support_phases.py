@@ -14,11 +14,10 @@ from nlp_gait.gaits.biped.bounds import make_hip_variables, make_lift_variable, 
 from nlp_gait.gaits.biped.curves import Trajectory, move_hip
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, Margins, SplineClearance, compute_margins
-from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits
-from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.symbolic import trajectories
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -102,10 +101,10 @@ def make_support_phase(
     trajectory: Trajectory,
     grid: Grid,
     goal: Goal,
-    sharing: LoadSharing | None = None,
+    loads: Loader | None = None,
     derivatives: Derivatives = "analytic",
 ) -> Phase:
-    """Return a phase with feet ``step_m`` apart; ``sharing`` is that of double support, None in single support.
+    """Return a phase with feet ``step_m`` apart; ``loads`` are those of double support, None in single support.
 
     Single support is from rest behind the standing foot to rest in front of it, double support from touch-down of the right foot,
     a step ahead of the left one, to lift-off of the left one.
@@ -113,7 +112,6 @@ def make_support_phase(
     swings, soles, stance = name == Support.SINGLE, place_soles(body, step_m), place_stance(body, step_m)
     hip_places = (stance.hip_x, stance.hip_y) if swings else place_hip(body, soles)
     standing = {side: trajectories.resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
-    sharing = sharing or LoadSharing(make_single_support_loads(body))
     splines = body.make_splines(name, trajectory)
 
     def swing(point: InstantPoint, curves_added: Mapping[str, Motion], height: float, s: SX) -> Motion:
@@ -137,22 +135,22 @@ def make_support_phase(
     clearance = (SplineClearance(sole, step_m, LIFT),) if swings and splines.count else ()
     curve_limits = body.make_curve_limits(name, splines.count)
     lift = (make_lift_variable(body),) if swings else ()
-    last = (*lift, make_time_variable(body, name), *splines.variables, *sharing.variables)
+    last = (*lift, make_time_variable(body, name), *splines.variables)
     variables = (*make_hip_variables(body), *body.angle_variables, *last)
     names = [variable.name for variable in variables]
     return Phase(
         body=body,
         variables=variables,
         duration=TIMES[name],
-        plan=sharing.add_to(plan),
-        loads=sharing.loads,
+        plan=plan,
+        loads=loads or make_single_support_loads(body),
         grid=grid,
         derivatives=derivatives,
-        limits=(*make_phase_limits(body, balance), *clearance, *curve_limits, *body.motors.limits, *sharing.limits),
+        limits=(*make_phase_limits(body, balance), *clearance, *curve_limits, *body.motors.limits),
         goal=goal,
         standing=name.standing,
         kinks=splines.kinks,
-        start=sharing.start(names, splines.start_of(names)),
+        start=splines.start_of(names),
     )
 
 

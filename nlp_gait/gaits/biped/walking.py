@@ -10,7 +10,7 @@ from nlp_gait.gaits.biped.cycle import CycleObjective, Landing, plan_cycle
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.footholds import Foothold, parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
-from nlp_gait.gaits.biped.load_sharing import share_load
+from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.problems import LoadOptions, SampleOptions
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 
@@ -34,9 +34,8 @@ class WalkOptions(SampleOptions):
 
 def make_cycle_problem(body: Body, options: CycleOptions) -> GaitProblem:
     """Return the problem of a cycle."""
-    grid = options.make_grid(torso_share=options.torso_share)
-    sharing = share_load(body, options.torso_share, options.load_degree)
-    return plan_cycle(body, grid, options.objective, sharing, options.landing)
+    loads = make_divided_loads(body, options.torso_share)
+    return plan_cycle(body, options.make_grid(), options.objective, loads, options.landing)
 
 
 def make_walk_problem(

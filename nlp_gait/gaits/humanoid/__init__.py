@@ -19,8 +19,7 @@ Options that the problems share:
     rule                   of means over time: trapezoid, with the mean margins over samples; or simpson
     objective              what is minimised: power, joint jerk, or the rate of torques; of a cycle energy per metre, or power
     motors                 features of the real motors, see ``gaits.biped.motors``, if the file has their data
-    torso_share            in double support: lever shares the torso's mass by the lever rule, free plans the ground's wrench
-    load_degree            of that wrench's polynomials over double support
+    torso_share            in double support: the torso's mass is shared by the lever rule, or as printed
     landing                of a cycle's swinging foot: soft, at rest; or inelastic, an impact at touch-down after which all joints
                            go on with other rates, see ``gaits.biped.impact``
     limits                 more limits of every phase, see ``nlp_gait.limits``

@@ -11,11 +11,10 @@ Options that the problems share:
     rotational_inertia     false takes every link as a point mass, in torques and ZMP
     step_length_m          from foot to foot; 0 for 0.06 m in proportion
     torso_share            rule that divides the torso's mass between the legs in double support, see
-                           ``loads.share_torso``; free plans the ground's wrench on the second foot instead
-    load_degree            of that wrench's polynomials over double support
+                           ``loads.share_torso``
     trajectory             of hip, swing foot and arms, or of every free joint: the paper's cubics, or cubics plus splines
     samples_per_interval   above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with
-                           cubics, 4 with splines and with planned loads, which would otherwise bend between the samples
+                           cubics, 4 with splines, which would otherwise bend between the samples
     rule                   of means over time: trapezoid, with the mean margins over samples, as in the paper; or simpson
     objective              what is minimised: power as in the paper, joint jerk, or the rate of torques
     arms                   carried by the legs, or separate: in the torques the legs carry a torso without arms, and each arm

@@ -12,7 +12,7 @@ from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, Trajectory
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.load_sharing import share_load
+from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase_problem import make_phase_problem
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.nao.free_joints import fit_joints, make_free_single_support_phase
@@ -71,9 +71,9 @@ def nao_dsp_free(robot: NaoOptions, options: FreeOptions, loads: PaperLoads) -> 
         Ends, limits, loads and objective of Gupta, Pratihar, Deb (2023), section 4.2; the formulation is this package's own.
     """
     body, grid = make_leaning_nao(robot.make_body()), options.make_grid()
-    sharing = share_load(body, loads.torso_share, loads.load_degree)
     step_m = body.check_step_length(options.step_length_m)
-    phase = make_support_phase(body, Support.DOUBLE, step_m, options.trajectory, grid, Goal(), sharing)
+    divided = make_divided_loads(body, loads.torso_share)
+    phase = make_support_phase(body, Support.DOUBLE, step_m, options.trajectory, grid, Goal(), divided)
     return make_phase_problem(
         "dsp-free", "double support with a leaning torso: least mean power", phase, searchable=False
     )

@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.power_form import PowerForm
-from nlp_gait.gaits.biped.load_sharing import TorsoShare
+from nlp_gait.gaits.biped.loads import Division
 from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.problems import LoadOptions, PhaseOptions, make_support_problem
 from nlp_gait.gaits.nao.body import Arms, NaoBody, ZmpGravity, ZmpMasses, make_nao
@@ -74,7 +73,7 @@ class PaperPhase(PhaseOptions):
 class PaperLoads(LoadOptions):
     """Loads as printed."""
 
-    torso_share: TorsoShare = "printed"
+    torso_share: Division = "printed"
 
 
 @maker
@@ -99,21 +98,17 @@ def nao_dsp(robot: DoubleSupportReading, options: PaperPhase, loads: PaperLoads)
     Source:
         Gupta, Pratihar, Deb (2023), sections 3.2 and 4.2.
     """
-    if loads.torso_share == "free" and robot.arms != "carried":
-        raise InputError(
-            f"arms={robot.arms!r} does not go with torso_share='free', where the legs carry all; choose arms='carried'"
-        )
     body = robot.make_body()
     problem = make_support_problem(body, options, loads, options.derivatives)
     return _add_power_form(problem, body, vars(robot) | vars(options), loads.torso_share)
 
 
 def _add_power_form(
-    problem: GaitProblem, body: NaoBody, options: Mapping[str, Any], rule: TorsoShare | None = None
+    problem: GaitProblem, body: NaoBody, options: Mapping[str, Any], rule: Division | None = None
 ) -> GaitProblem:
     """Return the problem with its formulas for proofs, if they are those of its options."""
     usual = all(options.get(name, value) == value for name, value in FORM_OPTIONS.items())
-    if not usual or options["samples_per_interval"] > 1 or rule == "free":
+    if not usual or options["samples_per_interval"] > 1:
         return problem
 
     def make(changed: GaitProblem) -> PowerForm:

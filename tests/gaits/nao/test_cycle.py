@@ -10,7 +10,7 @@ import pytest
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.biped.cycle import make_walking_cycle
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.load_sharing import share_load
+from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
@@ -73,10 +73,10 @@ def sampled(at_speed: GaitProblem) -> list[Sampled]:
 def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
     """Single and double support, both with their samples at the switch."""
     body = make_nao("nao-v5")
-    sharing = share_load(body, problem.options["torso_share"])  # type: ignore[arg-type]
+    loads = make_divided_loads(body, problem.options["torso_share"])  # type: ignore[arg-type]
     assert problem.grid is not None
     cycle = make_walking_cycle(
-        body, sharing, problem.grid, Goal(), at_given_speed=problem.options["objective"] == "power"
+        body, loads, problem.grid, Goal(), at_given_speed=problem.options["objective"] == "power"
     )
     at = cycle.read_section(cycle.sections[0], problem.at(x))
     single, double = (phase.signals(at) for phase in cycle.phases.values())

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
@@ -167,8 +166,3 @@ def test_separate_arms_load_no_leg_and_move_on_a_torso_at_rest(name: str, tmp_pa
     np.testing.assert_allclose(
         tau[3, arms], [oracle.torques[separate.joints[k]] for k in arms], atol=TORQUE_TOLERANCE_NM
     )
-
-
-def test_separate_arms_do_not_go_with_a_planned_load() -> None:
-    with pytest.raises(InputError, match="arms='separate' does not go with torso_share='free'"):
-        load("nao-dsp", arms="separate", torso_share="free")
