@@ -1,6 +1,6 @@
 """Measure what the smoothed balance margin costs: ``python -m docs.smoothing [WIDTH_M...]``.
 
-For each width of the sigmoid IPOPT solves NAO's single support, from the optimum of the last width; the exact functions judge the
+For each width of the sigmoid IPOPT solves NAO's single support, from the best point of wider ones; the exact functions judge the
 point. By default these are the widths of the solver, and the table of ``docs/model/smoothed-margin.md`` is written.
 """
 
@@ -31,13 +31,15 @@ def measure(widths: list[float], margin_m: float) -> list[dict[str, Any]]:
     exact, model = build_exact_model(problem), build_nlp(problem)
     method = ca.nlpsol("smoothed", "ipopt", model.nlp, OPTIONS)
     x = problem.check_x(nlp_gait.solve(problem, starts=3, seed=0).x)
-    best, found = exact.at(x, problem.p).cost, []
+    best, levels = exact.at(x, problem.p).cost, list[dict[str, Any]]()
+    start = model.start(problem, problem.start_point(np.random.default_rng(0)), widths[0])
     for width in widths:
-        start = model.start(problem, x, width)
         result = method(x0=start, p=np.append(problem.p, width), **model.bounds(problem))
         x = model.point(np.array(result["x"]).ravel())
         values = exact.at(x, problem.p)
-        found.append(
+        if not levels or levels[-1]["violation"] > 0.0 or values.cost < levels[-1]["power_W"]:
+            start = result["x"]
+        levels.append(
             {
                 "margin_m": margin_m,
                 "width_m": width,
@@ -47,8 +49,8 @@ def measure(widths: list[float], margin_m: float) -> list[dict[str, Any]]:
                 "iterations": int(method.stats()["iter_count"]),
             }
         )
-        print(found[-1], method.stats()["return_status"])
-    return found
+        print(levels[-1], method.stats()["return_status"])
+    return levels
 
 
 def main() -> None:
@@ -56,9 +58,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m docs.smoothing", description=__doc__.splitlines()[0])
     parser.add_argument("widths", type=float, nargs="*", help="widths of the sigmoid [m]")
     widths = parser.parse_args().widths
-    found = [row for margin in MARGINS_M for row in measure(widths or [*WIDTHS, *NARROWER_WIDTHS], margin)]
+    rows = [row for margin in MARGINS_M for row in measure(widths or [*WIDTHS, *NARROWER_WIDTHS], margin)]
     if not widths:
-        TABLE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        TABLE.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -209,7 +209,7 @@ def find_optimum(problem: GaitProblem, near: Outcome) -> Optimum:
         raise InputError(
             f"{problem.name} has {unknowns} variables; prices and sensitivities support at most {LARGEST}; use fewer intervals"
         )
-    sharper = SHARP.run_from(problem, near)
+    sharper = replace(SHARP, widths=(near.guess.width,)).run_from(problem, near)
     guess = near.guess if sharper is None or sharper.guess is None or not sharper.converged else sharper.guess
     return _fix_flat_lifts(_converge(problem, functions, guess))
 

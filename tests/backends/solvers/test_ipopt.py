@@ -218,3 +218,20 @@ def test_widths_of_ones_own_narrow_from_stage_to_stage() -> None:
     for widths in ((1e-3, 1e-2), (1e-2, 0.0)):
         with pytest.raises(InputError, match=r"widths must be positive and narrow from stage to stage, got \(0\.0"):
             IpoptSettings(widths=widths)
+
+
+@pytest.mark.parametrize("margin_m", [0.05, 0.065])
+def test_the_usual_widths_end_at_the_gait_of_narrower_ones(margin_m: float) -> None:
+    problem = load("nao-ssp").with_values(dbm_x_mean_limit_m=margin_m)  # 0.065: samples stay at the edge of the jump
+    usual, wide, narrow = (
+        solve(problem, starts=4, solver=IpoptSettings(widths=widths))
+        for widths in ((), (1e-2,), (1e-2, 5e-4, 2e-4, 1e-4, 5e-5))
+    )
+    assert {outcome.converged for outcome in usual.starts} == {True}
+    for outcome in usual.starts:
+        assert outcome.cost <= min(wide.objective, narrow.objective) * (1 + 5e-4)
+    guess = usual.best.guess
+    assert guess is not None and guess.width == (
+        5e-4 if margin_m == 0.05 else 2e-5
+    )  # no stage more than the gait needs
+    assert usual.objective == pytest.approx(0.845869 if margin_m == 0.05 else 0.849248, rel=1e-6)
