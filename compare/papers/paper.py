@@ -258,7 +258,7 @@ class Paper(Generic[E, R]):
 
     def _tabulate_headlines(self, found: Mapping[str, Mapping[str, Judgement]]) -> Table:
         rows = []
-        for id in self.headlines:
+        for id in sorted(self.headlines, key=lambda id: next(iter(found[id].values())).verdict is Ruling.NOT_RUN):
             claim, row = self.book.claims[id], found[id]
             first, held = next(iter(row.values())), [at for at, one in row.items() if one.verdict is Ruling.HOLDS]
             holds_in = "every reading" if len(held) == len(row) else "; ".join(held) or "no reading"
