@@ -24,14 +24,13 @@ from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import make_rigid_bodies, make_signals, measure_stair
-from nlp_gait.gaits.stairs.ideal import AXES, NOISE, PARAMETERS, SOLE_LOAD, TOE_LOAD, IdealStep, make_equal_rows
+from nlp_gait.gaits.stairs.ideal import AXES, NOISE, PARAMETERS, IdealStep, make_equal_rows
 from nlp_gait.gaits.stairs.planar_biped import MOVING
 from nlp_gait.gaits.stairs.planned_motion import (
     Stair,
     StepKind,
     compute_shank_gaps,
     compute_stair_height,
-    list_shank_edges,
 )
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -184,31 +183,12 @@ class Climb:
                 lower=ca.vec(least) - rounding,
                 columns=swing,
             ),
-            stair.make_rows(
-                "shanks",
-                gaps,
-                tuple(f"{'stance' if m else 'swing'}, {i}" for m, i in list_shank_edges(part.stair_kind)),
-                "m",
-                0.01,
-                lower=0.0,
-            ),
+            stair.limit_shanks(gaps, part.stair_kind),
         ]
         for instant, stands in ((0, not part.behind), (n, not part.ahead)):
             if stands:
-                margin = point["zmp_margin_m"]
-                rows += [
-                    make_equal_rows("rest", ends[2:4, instant], AXES, (instant,), "m/s", 0.1),
-                    stair.make_rows(
-                        "standing",
-                        centre[:, instant],
-                        ("x",),
-                        "m",
-                        0.01,
-                        lower=margin,
-                        upper=biped.load_toe_foot_biped().foot_m - margin,
-                        columns=(instant,),
-                    ),
-                ]
+                rest = make_equal_rows("rest", ends[2:4, instant], AXES, (instant,), "m/s", 0.1)
+                rows += [rest, replace(stair.limit_stance_zmp(point, centre[:, instant]), name="standing")]
         return tuple(rows)
 
     def _join(
@@ -248,16 +228,7 @@ class Climb:
         legs = [*_reach(ankle - hip), *_reach(-hip)]
         angle = np.stack([*legs, still + TORSO, still, still])
         angle += NOISE * rng.standard_normal(angle.shape)
-        rate = np.gradient(angle, duration / n, axis=1)
-        return step.layout.join(
-            {
-                "angle": angle,
-                "rate": rate,
-                "acceleration": np.diff(rate, axis=1) * n / duration,
-                "toe_force": np.tile([[0.0], [TOE_LOAD]], step.toe_off),
-                "sole_force": np.tile([[0.0], [SOLE_LOAD]], step.sole_off),
-            }
-        )
+        return step.join_start(angle, duration)
 
     def compute_signals(self, at: NumericPoint) -> Signals:
         """Return the whole climb on a dense grid, with every second step mirrored."""

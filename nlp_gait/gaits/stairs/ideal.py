@@ -214,7 +214,11 @@ class IdealStep:
         size = np.tile([[tread], [values["rise_run_ratio"] * tread]], self.intervals + 1)
         angle = np.array(_make_angles_function().map(self.intervals + 1)(size, fractions))
         angle += NOISE * rng.standard_normal(angle.shape)
-        step = values["step_time_s"] / self.intervals
+        return self.join_start(angle, values["step_time_s"])
+
+    def join_start(self, angle: Array, duration_s: float) -> Array:
+        """Return the start point of link angles (7, n + 1) over equal times, with a part of the load on the rear foot."""
+        step = duration_s / self.intervals
         rate = np.gradient(angle, step, axis=1)
         return self.layout.join(
             {

@@ -29,7 +29,7 @@ from nlp_gait.gaits.stairs.plan_samples import (
     make_reach_function,
 )
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, load_toe_foot_biped
-from nlp_gait.gaits.stairs.planned_motion import PHASES, StepKind, list_shank_edges
+from nlp_gait.gaits.stairs.planned_motion import PHASES, StepKind
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Minimise = Literal["energy", "jerk"]
@@ -178,7 +178,7 @@ def _assemble_phase(step: PlannedStep, phase: int, point: Point, fractions: MX, 
         heights = step.clearances(point, ops, make_grid_at(phase, share(fractions)))
         clear = (_limit_clearance(heights, point["clearance_m"]),)
     if step.shank_limits:
-        clear = (*clear, _limit_shanks(step.shank_gaps(point, ops, grid), step.kind))
+        clear = (*clear, stair.limit_shanks(step.shank_gaps(point, ops, grid), step.kind))
     energy = (end - start) * ca.sum1(ca.sum2(ca.fabs(samples.power))) / fractions.shape[1]
     return Assembly(
         objective=energy, constraints=(*_make_rows_at(point, samples, step), *clear), indexes={"energy_J": energy}
@@ -187,11 +187,6 @@ def _assemble_phase(step: PlannedStep, phase: int, point: Point, fractions: MX, 
 
 def _limit_clearance(heights: MX, least: MX) -> Constraint:
     return stair.make_rows("clearance", heights, ("toe", "sole", "ankle"), "m", 0.01, lower=least)
-
-
-def _limit_shanks(gaps: MX, kind: StepKind) -> Constraint:
-    edges = (f"{'stance' if mark else 'swing'}, step {level}" for mark, level in list_shank_edges(kind))
-    return stair.make_rows("shanks", gaps, tuple(edges), "m", 0.01, lower=0.0)
 
 
 def _make_rows_at(point: Point, samples: PlanSamples, step: PlannedStep) -> tuple[Constraint, ...]:
@@ -237,7 +232,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
         constraints=(
             *_make_rows_at(point, samples, step),
             _limit_clearance(step.clearances(point, ops), least_clearance),
-            *((_limit_shanks(step.shank_gaps(point, ops), step.kind),) if step.shank_limits else ()),
+            *((stair.limit_shanks(step.shank_gaps(point, ops), step.kind),) if step.shank_limits else ()),
             Constraint(name="phase_duration", labels=PHASES, unit="s", scale=0.1, value=durations, lower=least),
             *rest,
         ),

@@ -10,7 +10,7 @@ from casadi import MX, SX
 from nlp_gait.formulation import Array, Columns, Constraint, Point, Variable, make_parameters, make_vector_columns
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, load_toe_foot_biped
-from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan
+from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, StepKind, list_shank_edges
 
 PAPER_TIMES = (0.5, 1.4, 2.2, 3.5)  # t1, t2, t_bc, t3 [s], Table III
 EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
@@ -109,6 +109,12 @@ def limit_grip(name: str, force: MX, friction: MX) -> Constraint:
 def limit_stance_load(point: Point, force: MX) -> Constraint:
     """Return rows for the least load of the stance foot, with forces (2, m) [N]."""
     return make_rows("stance_load", force[1, :], ("z",), "N", 100.0, lower=point["least_stance_force_N"])
+
+
+def limit_shanks(gaps: MX, kind: StepKind) -> Constraint:
+    """Return rows that keep shanks outside the steps, with gaps (g, m) by ``compute_shank_gaps`` [m]."""
+    edges = (f"{'stance' if mark else 'swing'}, step {level}" for mark, level in list_shank_edges(kind))
+    return make_rows("shanks", gaps, tuple(edges), "m", 0.01, lower=0.0)
 
 
 def limit_stance_zmp(point: Point, pressure: MX) -> Constraint:
