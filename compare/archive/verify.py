@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from compare.analysis.comparison import compare_problems
-from compare.analysis.simulated_gaits import select_best_gaits
 from compare.archive.unpack import unpack_archive
 from compare.report.study_report import make_study_document
 from compare.report.writing import render_markdown
@@ -19,7 +18,6 @@ from compare.study.record import RunRecord, load_problem
 from compare.study.record_files import RECORDS
 from compare.study.run_task import try_task
 from compare.study.settings import FILE, Manifest, read_manifest
-from compare.study.simulations import load_simulations
 from compare.study.task import SOURCE, Handling, Inputs, ProblemSpec, Stop, Task
 from nlp_gait.backends.identity import FILES
 from nlp_gait.decoding import decode
@@ -171,8 +169,7 @@ def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Findin
 def _check_report(folder: Path, records: Sequence[RunRecord]) -> str:
     """Write the report again, and compare its text."""
     comparisons = compare_problems(records)
-    simulated = load_simulations(folder, select_best_gaits(comparisons))
-    document = make_study_document(comparisons, read_manifest(folder), simulated)
+    document = make_study_document(comparisons, read_manifest(folder))
     again = render_markdown(document).split("\n")
     known = read_text(folder / REPORT, "report").split("\n")
     for number, (a, b) in enumerate(zip_longest(known, again), start=1):

@@ -64,7 +64,7 @@ REPLACEMENTS = {
         "simulate --push-at-s": "simulate --push X,Y,S has the time of the push",
         "--derivatives, --intervals, --option, --fix": "--set NAME=VALUE sets options and fixes variables",
         "compare --csv, import --csv": "report DIR --csv writes CSV files of a study",
-        "compare --engine": "report DIR --engine simulates the best gaits of a study",
+        "compare --engine, report --engine": "simulate RECORD.json simulates the gait of a run",
         "compare --penalty-weight": "give --handling penalty=WEIGHT",
         "compare --stagnation, compare --target": "a study file has it, see --config",
     }.items()

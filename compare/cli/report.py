@@ -1,8 +1,6 @@
 """``nlp-gait report`` and ``nlp-gait reproduce``."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -11,33 +9,18 @@ from typer import Argument, Option
 from compare.analysis.comparison import compare_problems
 from compare.analysis.failures import describe_unknown
 from compare.analysis.record_statistics import Weighting
-from compare.analysis.simulated_gaits import (
-    GAIT_HEADER,
-    describe_drive,
-    group_by_problem,
-    make_engine_rows,
-    measure_agreement,
-    select_best_gaits,
-)
-from compare.cli.command import OUTPUT, command, describe_stored, report_interrupts
+from compare.cli.command import OUTPUT, command, describe_stored
 from compare.cli.compare import list_excluded
 from compare.cli.options import Code, Scheduler, name_all, parse_numbers
-from compare.cli.printing import Output, Rows, describe_command, say, show_progress
+from compare.cli.printing import Output, describe_command, say, show_progress
 from compare.logs import write_ioh
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.report import FurtherFiles, rebuild_report, watch_report, write_report
 from compare.study.evidence import read_evidence
-from compare.study.record import RunRecord
 from compare.study.settings import read_manifest
-from compare.study.simulations import SimulatedGait, simulate_records
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
-from nlp_gait.simulation.drive import Drive
 
-ENGINE_TABLE = (
-    "Model and engine: mean power over a phase, or energy of ten steps per planned metre of a cycle; ranks of model and "
-    "engine; fate: a cycle walks that share of the planned distance."
-)
 WEIGHTS = "Evaluations counted for a first derivative and a Hessian (default: n + 1, (n + 1)(n + 2)/2)."
 CSV = "Write all runs and all judged points as CSV files too."
 LATEX = "Also write a table of each problem for papers (LaTeX, package booktabs)."
@@ -54,9 +37,6 @@ def report(
     *,
     folder: Annotated[Path, Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
     weights: Annotated[str | None, Option(metavar="GRADIENT,HESSIAN", help=WEIGHTS)] = None,
-    engine: Annotated[
-        bool, Option("--engine", help="Simulate every solver's best gait in MuJoCo (extra sim), unless stored.")
-    ] = False,
     latex: Annotated[bool, Option("--latex", help=LATEX)] = False,
     figures: Annotated[bool, Option("--figures", help=FIGURES)] = False,
     logs: Annotated[bool, Option("--logs", help=LOGS)] = False,
@@ -70,11 +50,9 @@ def report(
     evaluated again. Records whose numbers do not follow from it, or that contradict a proof, are excluded; then the exit status
     is 1.
 
-    With `--engine` the best gaits are simulated and stored, and the report says whether the engine confirms the model. With
-    `--watch` the report follows a running study until Ctrl-C.
+    With `--watch` the report follows a running study until Ctrl-C.
 
-    Examples: `nlp-gait report results`, `nlp-gait report results --weights 5,25`,
-    `nlp-gait report results --engine`
+    Examples: `nlp-gait report results`, `nlp-gait report results --weights 5,25`
     """
     weighting = _parse_weights(weights)
     name_all(code)
@@ -83,7 +61,6 @@ def report(
         watch_report(folder, lambda: rebuild_report(folder, weighting))
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = evidence.records
-    simulated = _simulate_best(folder, records) if engine else []
     further = FurtherFiles(csv=csv, latex=latex, figures=figures)
     written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
     if logs:
@@ -92,16 +69,7 @@ def report(
             say(f"not in the logs: {sentence}")
         write_ioh(comparisons, folder / "logs")
         written.append(folder / "logs")
-    gaits = {
-        problem: {"gaits": [asdict(gait) for gait in own], "agreement": asdict(measure_agreement(own))}
-        for problem, own in group_by_problem(simulated).items()
-    }
-    return Output(
-        data={**({"engine": gaits} if gaits else {}), "excluded": evidence.sentences},
-        parts=[*_describe_simulations(simulated)],
-        written=written,
-        failures=list_excluded(evidence.sentences),
-    )
+    return Output(data={"excluded": evidence.sentences}, written=written, failures=list_excluded(evidence.sentences))
 
 
 def _parse_weights(text: str | None) -> Weighting:
@@ -142,27 +110,3 @@ def reproduce(
     except KeyboardInterrupt:
         return Output(data={}, interrupted=f"interrupted; {describe_stored(out)}")
     return Output(data={"paper": paper}, written=[out / "report.md"])
-
-
-def _simulate_best(folder: Path, records: Sequence[RunRecord]) -> list[SimulatedGait]:
-    """Simulate every solver's best gait, unless stored; raises InputError if none of the problems can be simulated."""
-    gaits = select_best_gaits(compare_problems(records))
-    remedy = f"continue with `nlp-gait report --engine {folder}`"
-    with (
-        report_interrupts(f"interrupted while simulating; finished simulations are stored; {remedy}"),
-        show_progress("gaits", len(gaits)) as advance,
-    ):
-        simulated = simulate_records(folder, gaits, Drive(), advance)
-    if gaits and not simulated:
-        names = ", ".join(dict.fromkeys(record.problem for record in gaits))
-        raise InputError(f"no gait of {names} can be simulated in the engine; omit --engine")
-    return simulated
-
-
-def _describe_simulations(simulated: Sequence[SimulatedGait]) -> Iterator[str | Rows]:
-    """Yield a table per problem, and the agreement of engine and model."""
-    for problem, own in group_by_problem(simulated).items():
-        yield Rows(f"{problem} simulated: {describe_drive(own[0].drive)}", GAIT_HEADER, make_engine_rows(own))
-        yield measure_agreement(own).describe()
-    if simulated:
-        yield ENGINE_TABLE

@@ -7,7 +7,6 @@ from pathlib import Path
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
 from compare.analysis.headline import MANY, write_headlines
 from compare.analysis.record_statistics import Weighting
-from compare.analysis.simulated_gaits import select_best_gaits
 from compare.judge import evaluate
 from compare.report.document import Document, Section, make_table_section
 from compare.report.problem_section import load_gaits, make_problem_section
@@ -28,7 +27,6 @@ from compare.study.evidence import Exclusion, read_evidence
 from compare.study.record import RunRecord, load_gait
 from compare.study.record_files import RECORDS
 from compare.study.settings import Manifest, read_manifest
-from compare.study.simulations import SimulatedGait, load_simulations
 from nlp_gait.files import make_file_name, replace_nan, write_json, write_text
 
 REPORT_ALONE = FurtherFiles()
@@ -56,8 +54,7 @@ def write_report(
 ) -> list[Path]:
     """Write the report with stored simulations, its figures as SVG, and further files; return all paths."""
     comparisons = compare_problems(records, weighting)
-    simulated = load_simulations(folder, select_best_gaits(comparisons))
-    document = make_study_document(comparisons, manifest, simulated, excluded)
+    document = make_study_document(comparisons, manifest, excluded)
     written = write_document(folder, document)
     return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons, document)]
 
@@ -83,10 +80,9 @@ def watch_report(folder: Path, rewrite: Callable[[], object], sleep: Callable[[f
 def make_study_document(
     comparisons: Sequence[Comparison],
     manifest: Manifest,
-    simulated: Sequence[SimulatedGait] = (),
     excluded: Sequence[Exclusion] = (),
 ) -> Document:
-    """Return the document of a study, of its best gaits simulated in the engine, and of excluded records."""
+    """Return the document of a study, and of excluded records."""
     gaits = {comparison.problem: load_gaits(comparison) for comparison in comparisons}
     return Document(
         title="Solvers on " + ", ".join(c.problem for c in comparisons),
@@ -101,8 +97,8 @@ def make_study_document(
             make_folded_section(
                 "Optimum: active constraints, prices, gaits",
                 comparisons,
-                lambda c: list_optimum(c, gaits[c.problem], simulated),
-                *(() if simulated else (HOW,)),
+                lambda c: list_optimum(c, gaits[c.problem]),
+                HOW,
             ),
             make_settings_section(comparisons, manifest.sessions),
         ),

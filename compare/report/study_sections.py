@@ -8,7 +8,6 @@ from compare.analysis.columns import EFFORT, EVALUATIONS_TO, JUDGEMENT, SECONDS_
 from compare.analysis.comparison import Comparison
 from compare.analysis.failures import describe_unknown
 from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers, rank_over_problems
-from compare.analysis.simulated_gaits import GAIT_HEADER, describe_drive, make_engine_rows, measure_agreement
 from compare.analysis.units import BY_UNIT
 from compare.drawing.charts import encode_charts, plot_charts
 from compare.drawing.comparison_figures import (
@@ -23,14 +22,11 @@ from compare.report.provenance import TERMS, format_settings, make_solver_table
 from compare.report.writing import make_citation_section, make_session_section
 from compare.study.record import RunRecord
 from compare.study.settings import Session
-from compare.study.simulations import SimulatedGait
 from nlp_gait.files import make_file_name
 from nlp_gait.formulation.solution import ActiveConstraint
 
 SHOWN_CONSTRAINTS = 15
-HOW = Prose(
-    "`nlp-gait report DIR --engine` simulates the best gaits in MuJoCo (extra `sim`) and adds their energy and rank here."
-)
+HOW = Prose("`nlp-gait simulate RECORD.json` simulates a run's gait in MuJoCo (extra `sim`).")
 
 
 def make_folded_section(
@@ -91,10 +87,8 @@ def _format_p(value: float) -> str:
     return f"{value:.4f}" if value >= 1e-4 else f"{value:.1e}"
 
 
-def list_optimum(
-    comparison: Comparison, gaits: Mapping[str, GaitCurves] | str, simulated: Sequence[SimulatedGait]
-) -> tuple[Part, ...]:
-    """Return active constraints with prices, the gaits over time, in the engine, and limits between the samples."""
+def list_optimum(comparison: Comparison, gaits: Mapping[str, GaitCurves] | str) -> tuple[Part, ...]:
+    """Return active constraints with prices, the gaits over time, and limits between the samples."""
     charts = [] if isinstance(gaits, str) or not gaits else make_gait_charts(gaits)
     curves = Figure(
         name=f"{make_file_name(comparison.problem)}-curves",
@@ -107,7 +101,6 @@ def list_optimum(
     return (
         *_list_active(comparison),
         *((curves,) if charts else ()),
-        *make_engine_section([gait for gait in simulated if gait.problem == comparison.problem]),
         *_list_violated_between(comparison),
     )
 
@@ -149,29 +142,6 @@ def _describe_step(active: ActiveConstraint, unit: str) -> str:
     if step is None:
         return "-"
     return f"{active.price * step.size:+z.4f}{'' if unit == '1' else f' {unit}'} for {step.words}"
-
-
-def make_engine_section(simulated: Sequence[SimulatedGait]) -> tuple[Section, ...]:
-    """Return the section on every solver's best gait in the engine, for each drive; none without simulations."""
-    if not simulated:
-        return ()
-    parts: list[Part] = []
-    for drive in dict.fromkeys(gait.drive for gait in simulated):
-        alike = [gait for gait in simulated if gait.drive == drive]
-        parts.append(make_text_table(GAIT_HEADER, make_engine_rows(alike), f"Best gaits; {describe_drive(drive)}"))
-        parts.append(measure_agreement(alike).describe())
-    steps = simulated[0].steps
-    figure = (
-        "mean power over the phase"
-        if steps is None
-        else f"energy for each planned metre over {steps} steps, every second one mirrored"
-    )
-    introduction = (
-        f"Every solver's best gait, simulated open loop in MuJoCo. Model and engine: {figure}, mechanical and heat. The "
-        "model's value and rank refer to the planned motion on a dense grid. Ranks use the printed digits; a gait "
-        "that falls has none. For a cycle that does not fall, the walked share of the planned distance is given."
-    )
-    return (Section(title="In the physics engine", parts=(introduction, *parts)),)
 
 
 def _list_violated_between(comparison: Comparison) -> tuple[Section, ...]:

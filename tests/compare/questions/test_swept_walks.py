@@ -93,6 +93,6 @@ def test_the_command_simulates_stored_gaits(points: list[SweepPoint], folder: Pa
         assert point["walk"]["walked_m"] == pytest.approx(point["walk"]["planned_m"], rel=0.3)
     assert (folder / "nao-cycle-cost.svg").exists()
     page = (folder / "nao-cycle-sweep-speed_m_s-ipopt.md").read_text()
-    assert "Energy of 2 steps in the engine" in page and "2 gaits were simulated, none fell" in page
+    assert "Energy of 2 steps in the engine" in page and "2 gaits were simulated, 0 fell" in page
     error = found[0]["walk"]["engine_J_per_planned_m"] / found[0]["walk"]["model_J_per_m"] - 1.0
     assert f"{100 * error:+.2f} %" in page
