@@ -233,8 +233,8 @@ class Ipopt(Solver):
         if outcome.claimed and not outcome.feasible:
             refused = f"{outcome.status}, but the exact functions find it infeasible"
             outcome = replace(outcome, claimed=False, status=refused)
-        totals = {"iterations": run.iterations, "evaluations": run.evaluations}
-        return replace(outcome, time_s=time.perf_counter() - run.started, **totals)
+        time_s = time.perf_counter() - run.started
+        return replace(outcome, time_s=time_s, iterations=run.iterations, evaluations=run.evaluations)
 
     def _run_narrower(self, run: "_Run", outcome: Outcome, guess: Guess) -> Outcome:
         """Return the outcome of narrower sigmoids: the first feasible one, and from there on the cheapest."""
