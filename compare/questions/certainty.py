@@ -11,7 +11,7 @@ import numpy as np
 
 from compare.analysis.best_known import compute_gap
 from compare.analysis.units import with_unit
-from compare.questions.local_optima import LocalOptimum, UnseenOptima, cluster_ends, estimate_unseen, run_stored_starts
+from compare.questions.local_optima import LocalOptimum, bound_missed, cluster_ends, run_stored_starts
 from compare.questions.question import Answer, Question, Work
 from compare.report.document import make_text_table
 from compare.study.references import find_reference
@@ -52,7 +52,7 @@ class FoundCertainty:
     starts: int  #: of IPOPT
     statuses: dict[str, int]  #: number of starts by their status
     optima: tuple[LocalOptimum, ...]  #: distinct local optima, best first
-    unseen: UnseenOptima  #: estimates of others
+    largest_missed: float  #: share of starts that one unseen optimum attracts, at most, with 95 % confidence
     search: LongSearch | None  #: None if it was not requested
     certificate: Certificate | None  #: None if it was not requested, or branch and bound is not possible
 
@@ -81,7 +81,7 @@ class FoundCertainty:
         text = (
             f"{best.count} of {sum(o.count for o in self.optima)} converged starts reach the best of {len(self.optima)} "
             f"distinct optima; with 95 % confidence no unseen one attracts more than "
-            f"{100 * self.unseen.largest_missed:.2g} % of starts"
+            f"{100 * self.largest_missed:.2g} % of starts"
         )
         if self.search is not None and self.search.gap is not None:
             text += f"; after {self.search.evaluations:,} evaluations CMA-ES is {100 * self.search.gap:+.2g} % off the best known"
@@ -95,7 +95,7 @@ class FoundCertainty:
             "starts": self.starts,
             "statuses": self.statuses,
             "optima": [asdict(optimum) for optimum in self.optima],
-            "unseen": asdict(self.unseen),
+            "largest_missed": self.largest_missed,
             "search": None if self.search is None else asdict(self.search),
             "certificate": certificate,
             "proven": self.proven,
@@ -170,7 +170,7 @@ class Certainty(Question[FoundCertainty]):
             starts=self.starts,
             statuses=dict(Counter(end.status for end in ends)),
             optima=tuple(optima),
-            unseen=estimate_unseen(optima),
+            largest_missed=bound_missed(sum(optimum.count for optimum in optima)),
             search=search,
             certificate=certificate,
         )
@@ -181,16 +181,9 @@ class Certainty(Question[FoundCertainty]):
     def report(self, findings: FoundCertainty) -> Answer:
         problem, unit = findings.problem, findings.problem.objective.unit
         stem = f"{problem.name}-certainty"
-        proof, estimate = findings.certificate, findings.unseen
+        proof = findings.certificate
         optima = [
             (with_unit(o.objective, unit), f"{o.count:,}", f"{100 * o.share:.2f} %") for o in findings.optima[:LISTED]
-        ]
-        covered = None if estimate.expected_covered is None else 100 * estimate.expected_covered
-        estimates = [
-            ("share of starts in unseen optima (Good, Turing)", f"{100 * estimate.good_turing:.3g} %"),
-            ("expected number of all optima (Boender, Rinnooy Kan)", with_unit(estimate.expected_optima, "1", ".4g")),
-            ("expected share of starts in seen optima (the same)", with_unit(covered, "%", ".4g")),
-            ("largest share of one unseen optimum, 95 % confidence", f"{100 * estimate.largest_missed:.3g} %"),
         ]
         statuses = [(status, f"{count:,}") for status, count in findings.statuses.items()]
         listed = f"Distinct optima of {findings.starts:,} starts, {len(optima)} shown"
@@ -204,9 +197,6 @@ class Certainty(Question[FoundCertainty]):
             parts=(
                 make_text_table((problem.objective.name, "starts", "share"), optima, listed),
                 make_text_table(("status", "starts"), statuses, "Status of the starts"),
-                make_text_table(
-                    ("estimate", "value"), estimates, "Optima that no start reached: estimates, not proven"
-                ),
             ),
             results=certificates,
             data=findings.to_json(),

@@ -1,4 +1,4 @@
-"""Distinct local optima among the ends of many starts, and estimates of those that no start reached."""
+"""Distinct local optima among the ends of many starts."""
 
 import math
 import sys
@@ -13,7 +13,7 @@ from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 BATCH = 250  # starts that are stored together
 # Ends are one optimum if their objectives differ by no more than this, relative, and no variable by more than this share of its
@@ -41,23 +41,6 @@ class LocalOptimum:
     count: int  #: number of starts that reached it
     share: float  #: of the starts that converged
     x: tuple[float, ...]  #: of its best end
-
-
-@dataclass(frozen=True, kw_only=True)
-class UnseenOptima:
-    """Estimates from N starts of the optima that none of them reached. They are support, not proof: N is finite.
-
-    Source:
-        Good (1953), The population frequencies of species and the estimation of population parameters; Boender, Rinnooy Kan
-        (1987), Bayesian stopping rules for multistart global optimization methods, Mathematical Programming 37.
-    """
-
-    good_turing: float  #: share of starts that would reach an unseen optimum: the optima reached once, divided by N
-    #: Expected number of all local optima, for a uniform prior on their number and shares; None if the sample is too small
-    expected_optima: float | None
-    #: expected share of starts that reach seen optima, for the same prior; None likewise
-    expected_covered: float | None
-    largest_missed: float  #: upper bound, with 95 % confidence, of the share of starts that one unseen optimum attracts
 
 
 def run_stored_starts(
@@ -113,13 +96,6 @@ def cluster_ends(problem: GaitProblem, ends: Sequence[StartEnd]) -> list[LocalOp
     ]
 
 
-def estimate_unseen(optima: list[LocalOptimum]) -> UnseenOptima:
-    """Estimate the unseen optima from the counts of at least one optimum."""
-    counts: Array = np.array([optimum.count for optimum in optima], dtype=float)
-    n, w = float(counts.sum()), float(len(counts))
-    return UnseenOptima(
-        good_turing=float((counts == 1).sum()) / n,
-        expected_optima=w * (n - 1) / (n - w - 2) if n > w + 2 else None,
-        expected_covered=(n - w - 1) * (n + w) / (n * (n - 1)) if n > w + 1 else None,
-        largest_missed=-math.expm1(math.log(1 - CONFIDENCE) / n),
-    )
+def bound_missed(starts: int) -> float:
+    """Return the largest share of starts, with 95 % confidence, that an optimum attracts which none of so many starts reached."""
+    return -math.expm1(math.log(1 - CONFIDENCE) / starts)

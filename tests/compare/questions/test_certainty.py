@@ -8,7 +8,7 @@ from casadi import MX
 
 import nlp_gait
 from compare.questions.certainty import Certainty
-from compare.questions.local_optima import LocalOptimum, StartEnd, cluster_ends, estimate_unseen
+from compare.questions.local_optima import StartEnd, bound_missed, cluster_ends
 from compare.questions.question import find
 from compare.study.references import find_reference
 from nlp_gait.backends.identity import identify_problem
@@ -68,14 +68,8 @@ def test_ends_of_equal_value_far_apart_are_two_optima_and_failures_count_for_non
     assert sum(optimum.share for optimum in found) == pytest.approx(1.0)
 
 
-def test_estimates_by_hand() -> None:
-    counts = (6, 3, 1)
-    estimate = estimate_unseen([LocalOptimum(objective=1.0, count=n, share=n / 10, x=(0.0,)) for n in counts])
-    assert estimate.good_turing == pytest.approx(0.1)
-    assert estimate.expected_optima == pytest.approx(3 * 9 / 5)
-    assert estimate.expected_covered == pytest.approx(6 * 13 / 90)
-    assert (1 - estimate.largest_missed) ** 10 == pytest.approx(0.05)
-    assert estimate_unseen([LocalOptimum(objective=1.0, count=1, share=1.0, x=(0.0,))]).expected_optima is None
+def test_the_largest_missed_optimum_by_hand() -> None:
+    assert (1 - bound_missed(10)) ** 10 == pytest.approx(0.05)
 
 
 def test_gaps_are_measured_from_the_shipped_value_and_not_from_the_best_start() -> None:
