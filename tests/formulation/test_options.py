@@ -37,7 +37,7 @@ OTHER: dict[str, Any] = {
     "duration_s": 3.0,
     "instance": "walk12-w100",
     "tracking_limit": False,
-    "step": "first",
+    "stairs": 3,
 }
 
 

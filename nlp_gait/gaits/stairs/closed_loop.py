@@ -13,7 +13,7 @@ from nlp_gait.formulation import Point
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs.leg_network import ONLINE, solve_legs_by_network
 from nlp_gait.gaits.stairs.plan_samples import make_step_symbols
-from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, compute_stair_height
+from nlp_gait.gaits.stairs.planned_motion import Stair, compute_stair_height
 from nlp_gait.gaits.stairs.stair import EDGE_WIDTH, SETBACK, collect_governing, read_stair
 from nlp_gait.symbolic import quantised
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -88,7 +88,6 @@ class ClosedLoop:
     quanta: int  # number of steps of the rollout
     inverse_kinematics: InverseKinematics = "closed-form"  # source of the desired angles of both legs
     coordinates: Coordinates = "joint"  # what the controller measures and drives
-    kind: StepKind = "next"
     rates: Rates = "exact"  # desired ones: derivatives of the plan, or differences of its angles over a quantum
     base: Base = "stance-foot"  # pinned to its step; or the hip, on its planned curve, with six contacts
 
@@ -99,14 +98,14 @@ class ClosedLoop:
 
     @property
     def base_point(self) -> str:
-        """The hip; or the stance ankle, or the tip of the stance toe where the foot turns about it."""
-        return "H" if self.base == "hip" else "T'" if self.kind == "landing" else "A'"
+        """The hip, or the stance ankle."""
+        return "H" if self.base == "hip" else "A'"
 
     def locate_base(self, hip: SX) -> tuple[SX, SX, SX]:
         """Return place [m], velocity and acceleration (2,) of the base, from those of the hip (6,) if that is the base."""
         if self.base == "hip":
             return hip[:2], hip[2:4], hip[4:]
-        return SX(DM([biped.load_toe_foot_biped().foot_m * (self.kind == "landing"), 0])), SX(2, 1), SX(2, 1)
+        return SX(2, 1), SX(2, 1), SX(2, 1)
 
     def inputs(self, point: Point, ops: Nonsmooth) -> tuple[MX, MX]:
         """Return desired angles and rates (18, m + 1) of the links at the ends of quanta, and ``GIVEN``."""
@@ -114,7 +113,7 @@ class ClosedLoop:
         size = ca.vertcat(stair.tread, stair.rise)
         times = np.arange(self.quanta + 1) * QUANTUM
         plan = ca.repmat(ca.vertcat(collect_governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
-        planned = _make_desired(ops, self.kind).map(self.quanta + 1)(DM(times[None, :]), plan)
+        planned = _make_desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
         desired, place, speed = ca.vertsplit(planned, [0, 2 * N, 2 * N + 2, 2 * N + 4])
         if self.inverse_kinematics == "network":
             desired = solve_legs_by_network(desired, ONLINE)
@@ -128,7 +127,7 @@ class ClosedLoop:
             desired[:, 1:],
             DM(times[None, :-1]),
             ca.repmat(constants, 1, self.quanta),
-            0 * on_slope if self.kind == "first" else stair.rise / stair.tread * on_slope,
+            stair.rise / stair.tread * on_slope,
             ca.repmat(point["spin_in_zmp"], 1, self.quanta),
             ca.vertcat(place[:, :-1], speed[:, 1:], (speed[:, 1:] - speed[:, :-1]) / QUANTUM),
         )
@@ -167,7 +166,7 @@ class ClosedLoop:
         stair = Stair(parts["size"][0], parts["size"][1])
 
         def touch(point: SX) -> Contact:
-            height = point[1] - compute_stair_height(point[0], stair, SETBACK, EDGE_WIDTH, self.kind)
+            height = point[1] - compute_stair_height(point[0], stair, SETBACK, EDGE_WIDTH)
             return Contact(height, ca.jacobian(point[1], q).T, ca.jacobian(point[0], q).T, speed[::-1])
 
         contacts = [touch(found[name]) for name in CONTACTS if name != self.base_point]
@@ -223,9 +222,9 @@ class ClosedLoop:
         return QuantisedState(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
 
 
-def _make_desired(ops: Nonsmooth, kind: StepKind) -> ca.Function:
+def _make_desired(ops: Nonsmooth) -> ca.Function:
     """Return the function of (time, governing parameters, stair, reach margin) to the desired state and the hip's (22,)."""
-    (s, passing, *constants), plan, _, step = make_step_symbols(ops, kind)
+    (s, passing, *constants), plan, _, step = make_step_symbols(ops)
     given = ca.vertcat(*constants)
     angles = (ca.vertcat(moving, foot) for moving, foot in zip(step.q[:2], step.foot[:2], strict=True))
     pose = ca.Function("pose", [s, passing, given], [*angles, step.hip.position, step.hip.velocity])

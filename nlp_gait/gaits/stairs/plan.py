@@ -29,7 +29,7 @@ from nlp_gait.gaits.stairs.plan_samples import (
     make_reach_function,
 )
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, load_toe_foot_biped
-from nlp_gait.gaits.stairs.planned_motion import PHASES, StepKind
+from nlp_gait.gaits.stairs.planned_motion import PHASES
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Minimise = Literal["energy", "jerk"]
@@ -48,7 +48,6 @@ VARIABLES = (
 # half of all runs of IPOPT end at unreachable poses. Of two optima, the better one catches the cycloid early (t_bc at 1.0 to
 # 1.4 s on the stairs of Table IV, instead of 2.7 to 2.8 s), as the starts do.
 PLAUSIBLE = (0.67, 0.09, 0.25, 0.08, 1.0, 1.4, 0.5, 1.0, 1.4, 0.35, 0.2)
-ZMP_OF_STANDING = 0.08  # of the first step's start points, ahead of the ankles, where the hip stands still [m]
 SCATTER = 0.1
 DRAWS = 100
 PARTS_AT_START = 10  # of each phase, at which the legs of a start point reach
@@ -80,7 +79,6 @@ PARAMETERS = (
 def stairs_plan(
     *,
     minimise: Minimise = "energy",
-    step: StepKind = "next",
     balance: BalanceRule = "feet",
     angle_limits: bool = True,
     shanks: Shanks = "free",
@@ -91,8 +89,6 @@ def stairs_plan(
     Args:
         minimise: energy, the integral of sum |torque x rate| over all joints; jerk, the peak of the joints' jerk (the paper's
             knot shifting).
-        step: next, over a flat stance foot; landing, the same with the stance foot's reverse double support until t2; first,
-            one step up from standing at rest, with the hip from above the planned ZMP to where the next step starts.
         balance: feet, the centre of pressure below the stance foot; polygon, as printed, the ZMP of (49) in the convex hull of
             the contact points.
         angle_limits: whether angles of links and knees are limited; the paper gives no limits.
@@ -102,15 +98,10 @@ def stairs_plan(
     Source:
         Bhardwaj et al., section V and Table III.
     """
-    if step == "landing" and balance == "feet":
-        raise InputError(
-            "step 'landing' needs balance 'polygon': while it lands, the stance foot touches with its toe only"
-        )
     if intervals < len(PHASES) or intervals % len(PHASES):
         raise InputError(f"intervals must be a multiple of {len(PHASES)} (one part for each phase), got {intervals!r}")
     planned = PlannedStep(
         per_phase=intervals // len(PHASES),
-        kind=step,
         balance=balance,
         angle_limits=angle_limits,
         shank_limits=shanks == "limited",
@@ -138,7 +129,7 @@ def stairs_plan(
         toe = compute_ground_force(q, qd, qdd) - stance
         return make_standing_step(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe), float(at["t2_s"]))
 
-    model = make_simulation_model(step_motion) if step == "next" and balance == "feet" else None
+    model = make_simulation_model(step_motion) if balance == "feet" else None
     return GaitProblem(
         name="stairs-plan",
         title="Stairs, planned step: least energy or jerk",
@@ -148,7 +139,7 @@ def stairs_plan(
         assemble=assemble,
         grid=Grid(intervals=intervals, refined_by="intervals"),
         display=Display(motion=motion, skeleton=make_skeleton, simulation_model=model),
-        hints=SolverHints(start=partial(_start, step, variables)),
+        hints=SolverHints(start=partial(_start, variables)),
         rows_over_time=tuple(
             RowsOverTime(
                 name=name,
@@ -178,7 +169,7 @@ def _assemble_phase(step: PlannedStep, phase: int, point: Point, fractions: MX, 
         heights = step.clearances(point, ops, make_grid_at(phase, share(fractions)))
         clear = (_limit_clearance(heights, point["clearance_m"]),)
     if step.shank_limits:
-        clear = (*clear, stair.limit_shanks(step.shank_gaps(point, ops, grid), step.kind))
+        clear = (*clear, stair.limit_shanks(step.shank_gaps(point, ops, grid), "next"))
     energy = (end - start) * ca.sum1(ca.sum2(ca.fabs(samples.power))) / fractions.shape[1]
     return Assembly(
         objective=energy, constraints=(*_make_rows_at(point, samples, step), *clear), indexes={"energy_J": energy}
@@ -221,20 +212,13 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
     least_clearance = point["clearance_m"] + SAMPLING_RESERVE / step.per_phase**2
     ends = ca.vertcat(0, *(point[name] for name in PHASE_ENDS))
     durations, least = ends[1:] - ends[:-1], point["least_phase_s"]
-    leaning = samples.qd[MOVING.index("K'A'"), 0]
-    rest = (
-        (stair.make_rows("rest", leaning, ("K'A'",), "rad/s", 0.1, lower=0.0, upper=0.0),)
-        if step.kind == "first"
-        else ()
-    )
     return Assembly(
         objective=step.energy(samples, ops) if minimise == "energy" else ops.largest(jerk),
         constraints=(
             *_make_rows_at(point, samples, step),
             _limit_clearance(step.clearances(point, ops), least_clearance),
-            *((stair.limit_shanks(step.shank_gaps(point, ops), step.kind),) if step.shank_limits else ()),
+            *((stair.limit_shanks(step.shank_gaps(point, ops), "next"),) if step.shank_limits else ()),
             Constraint(name="phase_duration", labels=PHASES, unit="s", scale=0.1, value=durations, lower=least),
-            *rest,
         ),
         indexes={
             "energy_J": step.energy(samples, exact),
@@ -246,9 +230,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
     )
 
 
-def _start(
-    kind: StepKind, variables: tuple[Variable, ...], parameters: Mapping[str, float], rng: np.random.Generator
-) -> Array:
+def _start(variables: tuple[Variable, ...], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
     """Draw a point around the plausible plan, again until every phase has a duration and the legs reach."""
     ranges = np.array([variable.upper - variable.lower for variable in variables])
     tread = parameters["stair_length_m"] / 2
@@ -256,15 +238,13 @@ def _start(
     given = [parameters[parameter.name] for parameter in stair.GIVEN_PARAMETERS]
     lower, upper = (np.array([parameters[f"{v.name}.{end}"] for v in variables]) for end in ("lower", "upper"))
     about = np.array(PLAUSIBLE[: len(variables)])
-    if kind == "first":
-        about[[v.name for v in variables].index("zmp_start_m")] = ZMP_OF_STANDING
     best, least = np.empty(0), inf
     for _ in range(DRAWS):
         x = np.clip(about + SCATTER * ranges * rng.standard_normal(len(variables)), lower, upper)
         plan = np.concatenate([x[: len(stair.GOVERNING_VARIABLES)], given])
         named = dict(zip(stair.GOVERNING, plan, strict=True))
         durations = np.diff([0.0, *(named[name] for name in PHASE_ENDS)])
-        out_of_reach = np.array(make_reach_function(PARTS_AT_START, kind)(plan, size, margin)) - (1 - margin)
+        out_of_reach = np.array(make_reach_function(PARTS_AT_START)(plan, size, margin)) - (1 - margin)
         too_short = parameters["least_phase_s"] - durations
         violation = float(np.maximum(too_short, 0.0).sum() + np.maximum(out_of_reach, 0.0).sum())
         if not best.size or violation < least:

@@ -11,7 +11,7 @@ from casadi import DM, MX, SX
 from nlp_gait.formulation import Array, Point
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import planned_motion as planned
-from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan, StepKind
+from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan
 from nlp_gait.gaits.stairs.stair import EDGE_WIDTH, GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
@@ -63,7 +63,6 @@ class PlannedStep:
     """Per-sample functions of a planned step and their grid."""
 
     per_phase: int  # equal parts of each phase
-    kind: StepKind = "next"
     balance: BalanceRule = "feet"
     angle_limits: bool = True  # whether angles of links and knees are limited
     shank_limits: bool = False  # whether the shanks stay outside the steps
@@ -83,17 +82,17 @@ class PlannedStep:
         """Return the step at all samples, or at those of another grid."""
         s, passing = grid or self.grid
         if self.balance == "polygon":
-            return PlanSamples(*self._map_samples(make_balanced_function(ops, self.kind), point, s, passing))
-        function = sample_function(ops, self.kind)
+            return PlanSamples(*self._map_samples(make_balanced_function(ops), point, s, passing))
+        function = sample_function(ops)
         return PlanSamples(*self._map_samples(function, point, s, passing, point["rear_share"]))
 
     def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> MX:
         """Return heights (3, m) of toe, sole and ankle of the swing foot above the stair [m]."""
-        return self._map_samples(make_clearance_function(ops, self.kind), point, *(grid or self.clearance_grid))
+        return self._map_samples(make_clearance_function(ops), point, *(grid or self.clearance_grid))
 
     def shank_gaps(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> MX:
         """Return by how much the shanks stay outside the steps (g, m) [m]."""
-        return self._map_samples(make_shank_function(ops, self.kind), point, *(grid or self.grid))
+        return self._map_samples(make_shank_function(ops), point, *(grid or self.grid))
 
     def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
         """Return the integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
@@ -141,13 +140,13 @@ def make_phase_grid(fractions: list[Array]) -> tuple[DM, Array]:
     return ca.horzcat(*s), np.hstack(passing)
 
 
-def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
+def sample_function(ops: Nonsmooth) -> ca.Function:
     """Return the function of one sample to the fields of ``PlanSamples``.
 
     Its inputs are s, the current phase, governing parameters, size, reach margin and rear share: that of the
     whole ground force on the rear toe at the start, which falls to zero over the double support.
     """
-    inputs, plan, stair, step = make_step_symbols(ops, kind)
+    inputs, plan, stair, step = make_step_symbols(ops)
     rear_share = SX.sym("rear_share")
     s = inputs[0]
     dynamics = biped.make_loads("T")
@@ -155,7 +154,7 @@ def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     share = rear_share * (1 - support**2 * (3 - 2 * support))
     _, force, whole = dynamics(*step.q, SX(2, 1))
     torque, stance_force, pressure = dynamics(*step.q, share * force)
-    slope = _compute_slope(stair, kind)
+    slope = stair.rise / stair.tread
     # The whole ground force acts along a line through the stance foot's level at ``whole``; where it meets the slope.
     zmp = whole * force[1] / (force[1] - slope * force[0])  # (eq. 49)
     power = torque * (DM(biped.JOINT_RATES) @ step.q.velocity)
@@ -163,23 +162,23 @@ def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     return ca.Function("sample", [*inputs, rear_share], ca.cse(outputs))
 
 
-def make_balanced_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
+def make_balanced_function(ops: Nonsmooth) -> ca.Function:
     """Return the function of one sample with the load on both feet by ``compute_balance``; inputs without a rear share."""
-    inputs, plan, stair, step = make_step_symbols(ops, kind)
+    inputs, plan, stair, step = make_step_symbols(ops)
     s, passing, *_ = inputs
-    torque, power, *ground = compute_balance(step, plan, s, passing, _compute_slope(stair, kind), kind)
+    torque, power, *ground = compute_balance(step, plan, s, passing, stair.rise / stair.tread)
     outputs = _list_outputs(inputs, plan, step, torque[: len(biped.JOINTS)], power, *ground)
     return ca.Function("sample", inputs, ca.cse(outputs))
 
 
-def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: SX, kind: StepKind) -> tuple[SX, ...]:
+def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: SX) -> tuple[SX, ...]:
     """Return torques, power, forces, ZMP and support at fractions s (4,) of the phases, of which one is ``passing`` (4,).
 
     Outputs are those of ``PlanSamples``, with torques and power (8,) in the order of ``JOINT_SIDES``; the ZMP is (49) as printed:
     of point masses, on the virtual slope in all phases.
 
     Both feet share the load so that the stance foot carries what it can with its centre of pressure between its contact points;
-    the forces on them are parallel. In the first step the swing foot carries nothing.
+    the forces on them are parallel.
     """
     q, v, a = (ca.vertcat(part, foot) for part, foot in zip(step.q, step.foot, strict=True))
     place = biped.locate_points(q, step.stance_ankle.position)
@@ -193,14 +192,10 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     sole, toe, rear_sole, rear_toe = (place[name] for name in ("S'", "T'", "S", "T"))
     double = passing[0] + passing[1]
     rear = rear_toe[0] + passing[0] * (rear_sole[0] - rear_toe[0])
-    heel = SX(0)
-    if kind == "landing":
-        on = planned.compute_landing_share(plan, s)
-        heel = double * ((on > 1) * toe[0] + (on > 0) * (on <= 1) * sole[0])
-    front = ca.fmin(ca.fmax(moment / load, heel), toe[0])
+    front = ca.fmin(ca.fmax(moment / load, 0), toe[0])
     back = ca.vertcat(ca.fmin(ca.fmax(moment / load, rear), rear_toe[0]), rear_toe[1])
     arm = ca.fmin(biped.compute_moment(back, force) - front * load, -LEAST_ARM)
-    share = SX(0) if kind == "first" else double * ca.fmin(ca.fmax((moment - front * load) / arm, 0), 1)
+    share = double * ca.fmin(ca.fmax((moment - front * load) / arm, 0), 1)
 
     torque, rate = [], []
     for joint, links, sense, between in JOINT_SIDES.values():
@@ -213,10 +208,9 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     pressure = (moment - share * biped.compute_moment(back, force)) / ca.fmax(
         (1 - share) * load, biped.LEAST_LOAD * load
     )
-    behind = heel if kind == "first" else double * rear
     zmp = points / ca.fmax(force[1] - slope * force[0], biped.LEAST_LOAD * load)  # (eq. 49)
     power = ca.vertcat(*torque) * ca.vertcat(*rate)
-    return ca.vertcat(*torque), power, (1 - share) * force, pressure, zmp, ca.vertcat(behind, toe[0])
+    return ca.vertcat(*torque), power, (1 - share) * force, pressure, zmp, ca.vertcat(double * rear, toe[0])
 
 
 def _accelerate_centres(q: Motion, ankle: Motion) -> dict[str, SX]:
@@ -235,34 +229,28 @@ def _list_outputs(inputs: list[SX], plan: StairPlan, step: Posture, *loads: SX) 
     return [ca.dot(plan.durations, inputs[0]), *step.q, step.reach, *loads[:-1], *places, loads[-1]]
 
 
-def _compute_slope(stair: Stair[SX], kind: StepKind) -> SX:
-    """Slope k of (49); the hip does not rise in the first step."""
-    return SX(0) if kind == "first" else stair.rise / stair.tread
-
-
-def make_clearance_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
+def make_clearance_function(ops: Nonsmooth) -> ca.Function:
     """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``make_balanced_function``."""
-    inputs, _, stair, step = make_step_symbols(ops, kind)
+    inputs, _, stair, step = make_step_symbols(ops)
     found = biped.locate_points(biped.link_angles(step.q.position), step.stance_ankle.position)
     heights = [
-        found[name][1] - planned.compute_stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH, kind)
-        for name in "TSA"
+        found[name][1] - planned.compute_stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"
     ]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
 
 
-def make_shank_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
+def make_shank_function(ops: Nonsmooth) -> ca.Function:
     """Return the function of ``compute_shank_gaps``; inputs of ``make_balanced_function``."""
-    inputs, _, stair, step = make_step_symbols(ops, kind)
+    inputs, _, stair, step = make_step_symbols(ops)
     angles = ca.vertcat(step.q.position, step.foot.position)
     points = biped.locate_points(angles, step.stance_ankle.position)
-    return ca.Function("shanks", inputs, [ca.cse(planned.compute_shank_gaps(points, stair, SETBACK, kind))])
+    return ca.Function("shanks", inputs, [ca.cse(planned.compute_shank_gaps(points, stair, SETBACK))])
 
 
 @cache
-def make_reach_function(per_phase: int, kind: StepKind) -> ca.Function:
+def make_reach_function(per_phase: int) -> ca.Function:
     """Return the function of governing parameters, size and reach margin to cosines of both knees (2, m) at the samples."""
-    inputs, _, _, step = make_step_symbols(Exact(), kind)
+    inputs, _, _, step = make_step_symbols(Exact())
     s, passing = PlannedStep(per_phase=per_phase).grid
     one = ca.Function("reach", inputs, [ca.cse(step.reach)])
     given = [SX.sym("given", size.shape) for size in inputs[2:]]
@@ -272,11 +260,11 @@ def make_reach_function(per_phase: int, kind: StepKind) -> ca.Function:
     )
 
 
-def make_step_symbols(ops: Nonsmooth, kind: StepKind) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
+def make_step_symbols(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
     """Return symbols s, passing, governing parameters, size and reach margin; the plan, the stair and the posture of these."""
     s, passing, values = SX.sym("s", 4), SX.sym("passing", 4), SX.sym("governing", len(GOVERNING))
     size, margin = SX.sym("size", 2), SX.sym("margin")
     plan, stair = make_stair_plan(values), Stair(size[0], size[1])
     rates = passing / plan.durations
-    step = planned.compute_posture(plan, stair, s, rates, margin, ops, kind)
+    step = planned.compute_posture(plan, stair, s, rates, margin, ops)
     return [s, passing, values, size, margin], plan, stair, step

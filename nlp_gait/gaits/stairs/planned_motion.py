@@ -25,9 +25,8 @@ _LEAST_ROOT_SQUARED = 1e-6  # keeps the arc's root and slopes finite where a bad
 _LATEST = 1.0
 
 E = TypeVar("E")
-StepKind = Literal["next", "landing", "first"]
-"""Which step is planned: ``next`` over a stance foot that stands flat all the time; ``landing``, the same with the reverse double
-support: the stance foot, which landed on its toe, turns down until t2; ``first``, one step up from standing on both feet."""
+StepKind = Literal["next", "first"]
+"""Which ground a step passes: ``next`` within the stairs, or ``first`` from the floor before them."""
 
 
 class Stair(NamedTuple, Generic[E]):
@@ -121,20 +120,6 @@ def locate_ankle_on_toe(sole: SX, toe: SX) -> SX:
     return ca.vertcat(ahead, sole_m * ca.sin(sole) + toe_m * ca.sin(toe))  # (eq. 2)
 
 
-def compute_landed_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
-    """Return angles of sole and toe of the landed foot [rad]: the rear one's motion backwards (``locate_ankle_on_toe``)."""
-    first, second = ca.vertsplit(plan.durations[:2])
-    remaining = compute_landing_share(plan, s) * first
-    back = ca.vertcat(ca.fmin(remaining / first, 1), ca.fmax((remaining - first) / second, 0), 0, 0)
-    return compute_foot_angles(plan, back)
-
-
-def compute_landing_share(plan: StairPlan, s: SX) -> SX:
-    """Return the time until the landed foot is flat as a share of t1: above 1 it stands on its toe, then on its sole."""
-    first, second = ca.vertsplit(plan.durations[:2])
-    return (first * (1 - s[0]) + second * (1 - s[1])) / first
-
-
 def locate_ankle(plan: StairPlan, stair: Stair[SX], s: SX) -> SX:
     """(2,) position of the swing ankle [m], from the fractions s (4,) of the phases.
 
@@ -172,11 +157,8 @@ def locate_ankle(plan: StairPlan, stair: Stair[SX], s: SX) -> SX:
     return rising + (bridge - p1) + (cycloid(angle) - p4)
 
 
-def locate_hip(plan: StairPlan, stair: Stair[SX], s: SX, step: StepKind = "next") -> SX:
+def locate_hip(plan: StairPlan, stair: Stair[SX], s: SX) -> SX:
     """(2,) position of the hip [m], from the fractions s (4,) of the phases.
-
-    In the first step it stays level ("no change in hip altitude"), starts above the planned ZMP, where it can stand still,
-    and ends where the next step starts.
 
     Source:
         Bhardwaj et al., eqs. (21)-(26), with the arc of (25) as z_Ci + R - sqrt(R^2 - (x - x_start)^2): as printed it does
@@ -185,8 +167,6 @@ def locate_hip(plan: StairPlan, stair: Stair[SX], s: SX, step: StepKind = "next"
     t = ca.dot(plan.durations, s)
     rate = ca.sqrt(GRAVITY / plan.hip_height)  # (eq. 24)
     first, last, zmp_last = plan.hip_start, plan.hip_start + stair.tread, stair.tread + plan.zmp_end
-    if step == "first":
-        first, last, zmp_last = plan.zmp_start, plan.hip_start, plan.zmp_end
     planned_rise = zmp_last - plan.zmp_start
     a2, a3 = 3 * planned_rise / plan.t3**2, -2 * planned_rise / plan.t3**3  # (eq. 26)
 
@@ -200,8 +180,6 @@ def locate_hip(plan: StairPlan, stair: Stair[SX], s: SX, step: StepKind = "next"
     ahead = (end - start * fading) / (1 - fading**2)
     behind = (start - end * fading) / (1 - fading**2)
     x = particular(t) + ahead * ca.exp(rate * ca.fmin(t - plan.t3, _LATEST)) + behind * ca.exp(-rate * t)
-    if step == "first":
-        return ca.vertcat(x, plan.hip_height)
 
     arc = 2 * ca.atan2(stair.rise, stair.tread)
     radius = stair.tread / ca.sin(arc)
@@ -240,20 +218,12 @@ class Posture(NamedTuple):
     stance_ankle: Motion  # (2,) [m]
 
 
-def compute_posture(
-    plan: StairPlan, stair: Stair[SX], s: SX, rates: SX, margin: SX, ops: Nonsmooth, step: StepKind = "next"
-) -> Posture:
+def compute_posture(plan: StairPlan, stair: Stair[SX], s: SX, rates: SX, margin: SX, ops: Nonsmooth) -> Posture:
     """Return the posture at symbols s (4,), shares of the phases with rates 1 / duration or 0; margin of a knee's cosine."""
     stance = ca.vertcat(stair.tread, stair.rise)  # of the stance ankle from the rear one
-    climbed = stair  # half of the swing foot's way
-    if step == "first":
-        stance, climbed = SX(2, 1), Stair(stair.tread / 2, stair.rise / 2)
-    at_hip = move_in_time(locate_hip(plan, stair, s, step) - stance, s, rates)
-    at_ankle = move_in_time(locate_ankle(plan, climbed, s) - stance, s, rates)
+    at_hip = move_in_time(locate_hip(plan, stair, s) - stance, s, rates)
+    at_ankle = move_in_time(locate_ankle(plan, stair, s) - stance, s, rates)
     stance_foot = stance_ankle = Motion(SX(2, 1), SX(2, 1), SX(2, 1))
-    if step == "landing":
-        stance_foot = move_in_time(ca.vertcat(*compute_landed_angles(plan, s)), s, rates)
-        stance_ankle = move_in_time(locate_ankle_on_toe(*compute_landed_angles(plan, s)), s, rates)
     swing, swing_reach = _solve_leg(at_hip, at_ankle, margin, ops)
     support, support_reach = _solve_leg(at_hip, stance_ankle, margin, ops)
     feet = move_in_time(ca.vertcat(*compute_foot_angles(plan, s)), s, rates)

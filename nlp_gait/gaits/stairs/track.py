@@ -14,7 +14,6 @@ from nlp_gait.formulation.assembly import NumericPoint, Point, Variable, make_pa
 from nlp_gait.gaits.stairs import closed_loop, stair
 from nlp_gait.gaits.stairs.display import StepMotion, make_driven_step, make_simulation_model, make_skeleton
 from nlp_gait.gaits.stairs.planar_biped import LINKS, load_toe_foot_biped
-from nlp_gait.gaits.stairs.planned_motion import StepKind
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 # Plan of least energy for case 2 of Table IV: the optimum of stairs-plan.
@@ -62,7 +61,6 @@ def stairs_track(
     *,
     inverse_kinematics: closed_loop.InverseKinematics = "closed-form",
     coordinates: closed_loop.Coordinates = "joint",
-    step: StepKind = "next",
     rates: closed_loop.Rates = "exact",
     base: closed_loop.Base = "stance-foot",
     tracking_limit: bool = True,
@@ -79,10 +77,8 @@ def stairs_track(
         coordinates: what the controller measures and drives, and the disturbance acts on: joint angles and torques, and those of
             the stance sole, which stands on the ground; or as printed, where only the knees are joints (27), (28) and other
             angles are those of links.
-        step: ``next`` over a flat stance foot; ``landing``, the same with the reverse double support, in which the stance foot
-            turns down about the tip of its toe; or ``first`` from standing.
         rates: desired rates of the angles: exact, or as printed by differences over a quantum.
-        base: stance foot, pinned at its ankle (in landing at the tip of its toe), with five contacts; or as printed the hip, on
+        base: stance foot, pinned at its ankle, with five contacts; or as printed the hip, on
             its planned curve, with six.
         tracking_limit: whether errors of the controlled angles are limited, which the paper does not do.
         duration_s: of the rollout, in whole quanta of 0.01 s, at most 60 s.
@@ -96,7 +92,6 @@ def stairs_track(
         quanta=round(duration_s / closed_loop.QUANTUM),
         inverse_kinematics=inverse_kinematics,
         coordinates=coordinates,
-        kind=step,
         rates=rates,
         base=base,
     )
@@ -109,7 +104,7 @@ def stairs_track(
         *(v for v in stair.GOVERNING_VARIABLES if v.name == TORSO_PITCH),
     )
     tracked = TrackedStep(loop=loop, variables=variables, tracking_limit=tracking_limit)
-    model = make_simulation_model(tracked.move) if step == "next" else None
+    model = make_simulation_model(tracked.move)
     return GaitProblem(
         name="stairs-track",
         title="Stairs, tracked step: PD gains and torso pitch of least cost",
@@ -207,12 +202,11 @@ class TrackedStep:
 def compute_support(point: Point, loop: closed_loop.ClosedLoop) -> tuple[MX, MX]:
     """Return the rear and front end of the support polygon at the end of each quantum, (m, 1) ahead of the stance ankle [m].
 
-    The polygon reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe. In
-    the first step both feet begin side by side.
+    The polygon reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe.
     """
     foot = load_toe_foot_biped().foot_m
     times = DM(np.arange(1, loop.quanta + 1) * closed_loop.QUANTUM)
-    behind = 0 if loop.kind == "first" else foot - point["stair_length_m"] / 2
+    behind = foot - point["stair_length_m"] / 2
     return (times < point["t2_s"]) * behind, MX(DM([foot] * loop.quanta))
 
 

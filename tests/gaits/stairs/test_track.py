@@ -90,30 +90,6 @@ def test_joint_torques_and_angles_of_the_same_motion() -> None:
     assert power[0] == pytest.approx(power[1], abs=0.5)
 
 
-def test_the_reverse_double_support_turns_the_stance_foot_about_its_toe() -> None:
-    """It begins as the swing foot landed, stands flat from t2 on, and its ankle follows the plan."""
-    landing = nlp_gait.load("stairs-track", step="landing", duration_s=0.9)
-    arrays = landing.signals(np.array([1e4, 1e4, 1.4])).arrays
-    ankle, sole, toe = arrays["stance_ankle"], arrays["link_q"][:, 7], arrays["link_q"][:, 8]
-    assert toe[0] == pytest.approx(np.pi / 6, abs=0.01) and abs(sole[0]) < 0.01  # theta_b
-    assert np.abs(arrays["link_q"][-5:, 7:]).max() < 2e-3
-    expected = 0.12 * np.sin(sole) + 0.05 * np.sin(toe)  # (2)
-    assert ankle[:, 1] == pytest.approx(expected, abs=1e-9)
-    assert ankle[:, 1].max() > 0.05
-
-
-def test_the_first_step_starts_at_rest_on_both_feet() -> None:
-    """The polygon is the stance foot from the start; a plan for the next step has its ZMP behind it there."""
-    first = nlp_gait.load("stairs-track", step="first", duration_s=0.3)
-    x = [1e4, 1e4, 1.4]
-    arrays = first.signals(np.array(x)).arrays
-    assert np.abs(arrays["link_qd"][0]).max() < 0.2
-    assert arrays["link_q"][0, 0] == pytest.approx(arrays["link_q"][0, 2], abs=1e-3)  # legs side by side
-    _, violation, indexes = values(first, x)
-    assert indexes["zmp_margin_min_m"] == pytest.approx(np.minimum(arrays["zmp"], 0.17 - arrays["zmp"]).min())
-    assert violation > 0.0
-
-
 @pytest.mark.slow
 def test_a_held_hip_is_followed_by_soft_legs_without_compensation() -> None:
     """The paper's base and six contacts: the stance leg carries nothing, and gains like those of Table IV follow."""
