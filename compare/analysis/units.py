@@ -40,11 +40,6 @@ def format_percent(share: float | None) -> str:
     return f"{100 * share:z.4f} %" if abs(share) >= 5e-7 else f"{100 * share:.1e} %"
 
 
-def format_seconds(value: float, digits: str = ".3f") -> str:
-    """Format a time, for example ``0.013 s``; a dash for NaN, an unknown time."""
-    return "-" if math.isnan(value) else f"{format_number(value, digits)} s"
-
-
 def make_heading(words: str, unit: str) -> str:
     """Return a heading with its unit, for example ``power [W]``."""
     return words if unit == "1" else f"{words} [{unit}]"

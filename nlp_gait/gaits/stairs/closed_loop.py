@@ -226,7 +226,7 @@ def _make_desired(ops: Nonsmooth) -> ca.Function:
     """Return the function of (time, governing parameters, stair, reach margin) to the desired state and the hip's (22,)."""
     (s, passing, *constants), plan, _, step = make_step_symbols(ops)
     given = ca.vertcat(*constants)
-    angles = (ca.vertcat(moving, foot) for moving, foot in zip(step.q[:2], step.foot[:2], strict=True))
+    angles = (ca.vertcat(part, SX(2, 1)) for part in step.q[:2])
     pose = ca.Function("pose", [s, passing, given], [*angles, step.hip.position, step.hip.velocity])
     time = SX.sym("time")
     starts = ca.vertcat(0, ca.cumsum(plan.durations)[:3])

@@ -130,7 +130,7 @@ def make_skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton
     history = signals.arrays.get("link_q", signals.arrays["q"])  # absolute angles of the moving links, or of all
     samples = len(signals.arrays["t"])
     if history.shape[1] == len(biped.MOVING):
-        history = np.hstack([history, signals.arrays.get("stance_foot", np.zeros((samples, 2)))])
+        history = np.hstack([history, np.zeros((samples, 2))])
     at = _locate_points(history, signals.arrays.get("stance_ankle", np.zeros((samples, 2))))
     tread, rise = measure_stair(parameters)
     first, second = -SETBACK, tread - SETBACK

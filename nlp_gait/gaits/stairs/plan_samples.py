@@ -53,8 +53,6 @@ class PlanSamples(NamedTuple):
     zmp: MX  # (1, m) of the whole robot on the virtual slope, ahead of the stance ankle [m]
     hip: MX  # (2, m) [m]
     ankle: MX  # (2, m) of the swing leg [m]
-    stance_foot: MX  # (2, m) angles of the stance foot's sole and toe [rad]
-    stance_ankle: MX  # (2, m) [m]
     support: MX  # (2, m) rear and front end of the contact points; with ``feet`` both are zero [m]
 
 
@@ -180,9 +178,9 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     Both feet share the load so that the stance foot carries what it can with its centre of pressure between its contact points;
     the forces on them are parallel.
     """
-    q, v, a = (ca.vertcat(part, foot) for part, foot in zip(step.q, step.foot, strict=True))
-    place = biped.locate_points(q, step.stance_ankle.position)
-    middles, accelerations = biped.locate_centres(place), _accelerate_centres(Motion(q, v, a), step.stance_ankle)
+    q, v, a = (ca.vertcat(part, SX(2, 1)) for part in step.q)  # the stance foot is flat
+    place = biped.locate_points(q, SX(2, 1))
+    middles, accelerations = biped.locate_centres(place), _accelerate_centres(Motion(q, v, a))
     push, turn = biped.compute_pushes(accelerations, a)
     force = sum(push.values(), SX(2, 1))
     load = ca.fmax(force[1], biped.LEAST_LOAD * biped.GRAVITY * biped.load_toe_foot_biped().mass_kg)
@@ -213,26 +211,26 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     return ca.vertcat(*torque), power, (1 - share) * force, pressure, zmp, ca.vertcat(double * rear, toe[0])
 
 
-def _accelerate_centres(q: Motion, ankle: Motion) -> dict[str, SX]:
-    """Return the accelerations (2,) of the links' centres [m/s^2] from angles (9,) and the stance ankle."""
+def _accelerate_centres(q: Motion) -> dict[str, SX]:
+    """Return the accelerations (2,) of the links' centres [m/s^2] from angles (9,)."""
 
     def acceleration(link: str) -> SX:
         angle, rate, change = (part[biped.LINKS.index(link)] for part in q)
         normal = biped.compute_direction(link, angle + ca.pi / 2)
         return biped.get_rod(link).length_m * (change * normal - rate**2 * biped.compute_direction(link, angle))
 
-    return biped.locate_centres(biped.sum_along_links("A'", ankle.acceleration, acceleration))
+    return biped.locate_centres(biped.sum_along_links("A'", SX(2, 1), acceleration))
 
 
 def _list_outputs(inputs: list[SX], plan: StairPlan, step: Posture, *loads: SX) -> list[SX]:
-    places = [step.hip.position, step.ankle.position, step.foot.position, step.stance_ankle.position]
+    places = [step.hip.position, step.ankle.position]
     return [ca.dot(plan.durations, inputs[0]), *step.q, step.reach, *loads[:-1], *places, loads[-1]]
 
 
 def make_clearance_function(ops: Nonsmooth) -> ca.Function:
     """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``make_balanced_function``."""
     inputs, _, stair, step = make_step_symbols(ops)
-    found = biped.locate_points(biped.link_angles(step.q.position), step.stance_ankle.position)
+    found = biped.locate_points(biped.link_angles(step.q.position), SX(2, 1))
     heights = [
         found[name][1] - planned.compute_stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"
     ]
@@ -242,8 +240,7 @@ def make_clearance_function(ops: Nonsmooth) -> ca.Function:
 def make_shank_function(ops: Nonsmooth) -> ca.Function:
     """Return the function of ``compute_shank_gaps``; inputs of ``make_balanced_function``."""
     inputs, _, stair, step = make_step_symbols(ops)
-    angles = ca.vertcat(step.q.position, step.foot.position)
-    points = biped.locate_points(angles, step.stance_ankle.position)
+    points = biped.locate_points(biped.link_angles(step.q.position), SX(2, 1))
     return ca.Function("shanks", inputs, [ca.cse(planned.compute_shank_gaps(points, stair, SETBACK))])
 
 

@@ -214,8 +214,6 @@ class Posture(NamedTuple):
     reach: SX  # (2,) cosines of the swing and the stance knee: above 1 the ankle is out of reach
     hip: Motion  # (2,) [m]
     ankle: Motion  # (2,) of the swing leg [m]
-    foot: Motion  # (2,) angles of the stance foot's sole and toe [rad]
-    stance_ankle: Motion  # (2,) [m]
 
 
 def compute_posture(plan: StairPlan, stair: Stair[SX], s: SX, rates: SX, margin: SX, ops: Nonsmooth) -> Posture:
@@ -223,13 +221,13 @@ def compute_posture(plan: StairPlan, stair: Stair[SX], s: SX, rates: SX, margin:
     stance = ca.vertcat(stair.tread, stair.rise)  # of the stance ankle from the rear one
     at_hip = move_in_time(locate_hip(plan, stair, s) - stance, s, rates)
     at_ankle = move_in_time(locate_ankle(plan, stair, s) - stance, s, rates)
-    stance_foot = stance_ankle = Motion(SX(2, 1), SX(2, 1), SX(2, 1))
+    stands = Motion(SX(2, 1), SX(2, 1), SX(2, 1))  # the stance ankle
     swing, swing_reach = _solve_leg(at_hip, at_ankle, margin, ops)
-    support, support_reach = _solve_leg(at_hip, stance_ankle, margin, ops)
+    support, support_reach = _solve_leg(at_hip, stands, margin, ops)
     feet = move_in_time(ca.vertcat(*compute_foot_angles(plan, s)), s, rates)
     torso = constant_motion(0.0)._replace(position=plan.torso_pitch)
     reach = ca.vertcat(swing_reach, support_reach)
-    return Posture(stack(swing, support, torso, feet), reach, at_hip, at_ankle, stance_foot, stance_ankle)
+    return Posture(stack(swing, support, torso, feet), reach, at_hip, at_ankle)
 
 
 def _solve_leg(at_hip: Motion, at_ankle: Motion, margin: SX, ops: Nonsmooth) -> tuple[Motion, SX]:

@@ -42,7 +42,6 @@ COLUMNS = {
     "stance_force": make_vector_columns("N", "xz"),
     **{name: make_vector_columns("m", "x") for name in ("stance_pressure", "zmp")},
     **{name: make_vector_columns("m", "xz") for name in ("hip", "ankle", "stance_ankle")},
-    "stance_foot": Columns(unit="rad", labels=("A'S'", "S'T'")),
     "support": Columns(unit="m", labels=("rear", "front")),
 }
 

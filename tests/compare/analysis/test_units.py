@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from compare.analysis.units import format_millimetres, format_number, format_percent, format_seconds, with_unit
+from compare.analysis.units import format_millimetres, format_number, format_percent, with_unit
 
 
 @pytest.mark.parametrize(
@@ -32,5 +32,4 @@ def test_units_follow_numbers_whose_digits_mean_something() -> None:
     assert {value: with_unit(value, "W") for value in shown} == shown
     assert (with_unit(-1e-9, "W", ".3f"), with_unit(-1e-9, "1", "g")) == ("0.000 W", "-1e-09")
     assert format_millimetres(-1e-6) == "0.0 mm" and format_millimetres(None) == "-"
-    assert format_seconds(-0.0) == "0.000 s" and format_seconds(math.nan) == "-"
     assert format_percent(None) == format_percent(math.inf) == "-"
