@@ -33,7 +33,7 @@ def make_skeleton(result: Result, frames_per_s: float) -> Skeleton:
     """Return the skeleton of a gait with about this many samples a second; raises InputError for a problem without one."""
     problem = result.problem
     if problem.display.skeleton is None:
-        raise InputError(f"problem {problem.name!r} has no skeleton to draw")
+        raise InputError(f"problem {problem.name!r} has no skeleton to draw; the engine shows it: `simulate --page`")
     drawn = problem.display.skeleton(sample_signals(result, 1.0 / frames_per_s), problem.parameter_values)
     return replace(drawn, title=problem.title)
 

@@ -151,15 +151,6 @@ def solve_front(
     return select_front(filter(None, map(front.find_best, sorted(front.runs))))
 
 
-def solve_point(
-    problem: GaitProblem, criterion: CompetingObjective, least: float, x0: Sequence[float], solver: Solver
-) -> FrontPoint | None:
-    """Return the least power with the criterion at least at a value, from a start (n,); None if it does not converge."""
-    front = _Front(problem=problem, criterion=criterion, starts=0, solver=solver, progress=ignore_progress)
-    front.run(least, np.array(x0))
-    return front.find_best(least)
-
-
 def select_front(points: Iterable[FrontPoint]) -> tuple[FrontPoint, ...]:
     """Return the points, by rising criterion, that no other point equals or betters in both; the first of equal ones stays."""
     kept: list[FrontPoint] = []

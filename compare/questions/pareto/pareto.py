@@ -13,24 +13,19 @@ from compare.analysis.units import make_axis_label
 from compare.drawing.figures import COLOURS, add_legend_below, make_figure, use_style
 from compare.questions.pareto import front as front_module
 from compare.questions.pareto.competing import CompetingObjective, make_competing_objective
-from compare.questions.pareto.front import FrontPoint, Knee, find_knees, select_front, solve_front, solve_point
+from compare.questions.pareto.front import FrontPoint, Knee, find_knees, solve_front
 from compare.questions.question import Answer, Question, Work, make_record_table, make_table
 from compare.report.document import Figure, Part
 from compare.study.references import find_reference
 from compare.study.task import describe_problem
 from metaheuristics.multi_objective import check_budgets, make_front_algorithm, minimize_many
-from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint, identify_problem
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
-from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.progress import Progress
 
 # Reference point of the hypervolume, with the ranges of the true front as 1: a tenth beyond its worst values.
 REFERENCE = 1.1
-MOST_CHALLENGES = 1000
 SEARCHES = {"NSGA2": ("NSGA-II", COLOURS["ga"]), "CMOPSO": ("CMOPSO", COLOURS["pso"])}  # names in print and colours
 MARKS = ("x", "+", ".")
 
@@ -101,27 +96,15 @@ class Quality:
     gap: Spread | None  #: mean power above the true front's at an equal criterion, relative
 
 
-@dataclass(frozen=True, kw_only=True)
-class Challenge:
-    """The best points of all searches, compared with the least power at their own criterion."""
-
-    points: int  #: number of nondominated points
-    solved: int  #: for how many of these, the lowest, the least power was solved for
-    infeasible: int  #: how many of these the exact functions find infeasible
-    #: smallest power above the least one at an equal criterion, relative; negative if a point is better
-    least_gap: float
-    moved: int  #: number of points at which the front itself was improved by more than a millionth
-    front: tuple[FrontPoint, ...]  #: the front with all solved points
-
-
 class FoundFront(NamedTuple):
     """The true front with its knees, and what the searches found."""
 
-    front: tuple[FrontPoint, ...]  #: with the points that were solved to answer the searches
+    front: tuple[FrontPoint, ...]
     knees: tuple[Knee, ...]  #: of the front
     searches: tuple[SearchFront, ...] = ()  #: fronts of all runs
     qualities: tuple[Quality, ...] = ()  #: a row for each search and budget
-    challenge: Challenge | None = None  #: None without searches
+    #: least power of the searches' points above the straight lines between the front's points, relative; None without searches
+    least_gap: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -167,11 +150,9 @@ class Pareto(Question[FoundFront]):
             yield FoundFront(front, find_knees(front))
             return
         searches = self._run_searches(problem, front, work)
-        inputs |= {"searches": {name: list(b) for name, b in self.searches.items()}, "runs": self.runs}
-        challenge = partial(challenge_front, problem, criterion, front, searches, solver, progress)
-        outcome = work.compute(Challenge, f"challenge-{criterion.name}", inputs, challenge, code)
-        qualities = tuple(compute_qualities(outcome.front, searches))
-        yield FoundFront(outcome.front, find_knees(outcome.front), searches, qualities, outcome)
+        points = [point for search in searches for point in search.points]
+        least_gap = float(Scale(front).compute_excess(*to_arrays(points)).min()) if points else None
+        yield FoundFront(front, find_knees(front), searches, tuple(compute_qualities(front, searches)), least_gap)
 
     def _run_searches(self, problem: GaitProblem, front: Sequence[FrontPoint], work: Work) -> tuple[SearchFront, ...]:
         """Return the fronts of all runs on a problem without the criterion's demand; each finished run is stored."""
@@ -191,7 +172,7 @@ class Pareto(Question[FoundFront]):
         return fronts
 
     def report(self, findings: FoundFront) -> Answer:
-        problem, criterion, challenge = self.problem, self.criterion, findings.challenge
+        problem, criterion = self.problem, self.criterion
         stem = f"{problem.name}-front-{criterion.name}"
         caption = "The front as a line, its knees, and what the searches found; its cheap part on the right."
         value = f"{criterion.name}_{criterion.unit.replace('/', '_')}"
@@ -215,7 +196,7 @@ class Pareto(Question[FoundFront]):
                 "front": [asdict(point) for point in findings.front],
                 "knees": [asdict(knee) for knee in findings.knees],
                 "searches": [asdict(row) for row in findings.qualities],
-                "challenge": challenge and {key: v for key, v in asdict(challenge).items() if key != "front"},
+                "least_gap": findings.least_gap,
             },
         )
 
@@ -280,52 +261,6 @@ def _compute_spread(numbers: Sequence[float]) -> Spread:
     return float(np.min(numbers)), float(np.median(numbers)), float(np.max(numbers))
 
 
-def challenge_front(
-    problem: GaitProblem,
-    criterion: CompetingObjective,
-    front: Sequence[FrontPoint],
-    fronts: Sequence[SearchFront],
-    solver: Solver,
-    progress: Progress,
-) -> Challenge:
-    """Find the least power at the criterion of each nondominated point of all runs.
-
-    It is solved for from the point itself and from the nearest one of the front. If no point betters the true front here,
-    none does. Of more than a thousand points those are taken that are lowest above the straight lines between the front's
-    points.
-    """
-    points, scale = select_front(point for search in fronts for point in search.points), Scale(front)
-    order = np.argsort(scale.compute_excess(*to_arrays(points)), kind="stable")[:MOST_CHALLENGES]
-    solved: list[FrontPoint] = []
-    gaps: list[float] = []
-    infeasible = moved = 0
-    for point in (points[i] for i in order):
-        exact = build_exact_model(problem).at(point.x, problem.p)
-        if not exact.violation <= FEASIBILITY_TOLERANCE:
-            infeasible += 1
-            continue
-        near = front[int(np.argmin(np.abs(scale.values - point.value)))]
-        least = min(point.value, front[-1].value)
-        of_front, of_search = (solve_point(problem, criterion, least, p.x, solver) for p in (near, point))
-        candidates = [p for p in (of_front, of_search) if p is not None]
-        if not candidates:
-            gaps.append(exact.cost / near.power_W - 1.0 if near.value >= point.value else -np.inf)
-            continue
-        best = min(candidates, key=lambda p: p.power_W)
-        moved += of_front is None or best.power_W < of_front.power_W * (1.0 - 1e-6)
-        solved.append(best)
-        gaps.append(exact.cost / best.power_W - 1.0)
-        progress(f"{criterion.name} {point.value:.5g} {criterion.unit}")
-    return Challenge(
-        points=len(points),
-        solved=len(solved),
-        infeasible=infeasible,
-        least_gap=min(gaps, default=np.inf),
-        moved=moved,
-        front=select_front([*front, *solved]),
-    )
-
-
 def _make_tables(findings: FoundFront, criterion: CompetingObjective) -> tuple[Part, ...]:
     """Some points of the front, and its knees."""
     front, unit, per = findings.front, criterion.unit, f"W per {criterion.unit}"
@@ -348,8 +283,7 @@ def _make_tables(findings: FoundFront, criterion: CompetingObjective) -> tuple[P
 
 
 def _report_searches(findings: FoundFront, criterion: CompetingObjective) -> tuple[Part, ...]:
-    challenge = findings.challenge
-    if challenge is None:
+    if findings.least_gap is None:
         return ()
     columns: dict[str, Any] = {
         "solver": lambda q: q.solver,
@@ -360,10 +294,7 @@ def _report_searches(findings: FoundFront, criterion: CompetingObjective) -> tup
     }
     return (
         make_table("Searches: median over runs (least to greatest)", findings.qualities, columns),
-        f"{challenge.points} points of the searches are nondominated; the least power was solved for {challenge.solved} "
-        f"of these, the lowest. The nearest is {100 * challenge.least_gap:+z.4f} % above the least power at its "
-        f"{criterion.name}; {challenge.moved} of them moved the front, {challenge.infeasible} are infeasible for the exact "
-        "functions",
+        f"The nearest point of a search is {100 * findings.least_gap:+z.4f} % above the lines between the front's points",
     )
 
 
