@@ -200,14 +200,14 @@ class Paper(Generic[E, R]):
         runner = Runner(folder=folder, progress=progress, jobs=jobs, scheduler=scheduler, on_outdated=on_outdated)
         results = self.compute(runner, effort)
         progress("figure, tables and report")
-        found = self.judge(results, effort)
+        judged = self.judge(results, effort)
         label = "full" if effort == self.full else "quick" if effort == self.quick else "reduced"
-        parts = self._make_parts(results, found, effort)
+        parts = self._make_parts(results, judged, effort)
         record = {
             "effort": label,
             "settings": {k: v for k, v in asdict(effort).items() if v != getattr(self.full, k)},
             "session": asdict(session),
-            "verdicts": {id: {at: str(one.verdict) for at, one in row.items()} for id, row in found.items()},
+            "verdicts": {id: {value: str(one.verdict) for value, one in row.items()} for id, row in judged.items()},
             "parts": [encode_part(part) for part in parts if not isinstance(part, Figure)],
         }
         write_json(folder / "summary.json", record)
@@ -219,13 +219,14 @@ class Paper(Generic[E, R]):
         )
         cited = make_citation_section(record.inputs.problem for record in runner.records)
         title = self.title if label == "full" else f"{self.title} ({label})"
-        write_document(folder, Document(title=title, headline=[count_verdicts(found)], parts=(*parts, ending, cited)))
+        write_document(folder, Document(title=title, headline=[count_verdicts(judged)], parts=(*parts, ending, cited)))
         return record
 
     def judge(self, results: Mapping[str, R], effort: E) -> dict[str, dict[str, Judgement]]:
         """Return the verdicts on all claims by reading; claims on runs are not run without runs."""
         return {
-            id: {at: self._judge(id, results, at, effort) for at in self._list_readings(id)} for id in self.book.claims
+            id: {value: self._judge(id, results, value, effort) for value in self._list_readings(id)}
+            for id in self.book.claims
         }
 
     def _list_readings(self, id: str) -> Mapping[str, str]:
@@ -234,45 +235,45 @@ class Paper(Generic[E, R]):
     def _judge(self, id: str, results: Mapping[str, R], reading: str, effort: E) -> Judgement:
         if id in self.book.on_runs and not effort.runs:
             return Judgement(Ruling.NOT_RUN)
-        claim, found = self.book.claims[id], self.book.functions[id](results[reading])
-        if found is not None and not isinstance(found, Found):
-            found = Found(found)
-        return Judgement(decide(claim, found), describe(claim, found))
+        claim, judged = self.book.claims[id], self.book.functions[id](results[reading])
+        if judged is not None and not isinstance(judged, Found):
+            judged = Found(judged)
+        return Judgement(decide(claim, judged), describe(claim, judged))
 
     def _make_parts(
-        self, results: Mapping[str, R], found: Mapping[str, Mapping[str, Judgement]], effort: E
+        self, results: Mapping[str, R], judged: Mapping[str, Mapping[str, Judgement]], effort: E
     ) -> list[Part]:
         with use_style():
             figure = self.figure(results)
         own = [id for id in self.book.claims if id not in self.book.on_runs]
         runs = [id for id in self.book.claims if id in self.book.on_runs]
         return [
-            self._tabulate_headlines(found),
+            self._tabulate_headlines(judged),
             *map(Prose, self.explain(results)),
             *self.tables(results),
             figure,
-            self._fold("Claims decided by computation", own, found),
-            self._fold("Claims decided by runs of the searches", runs, found),
+            self._fold("Claims decided by computation", own, judged),
+            self._fold("Claims decided by runs of the searches", runs, judged),
             Section(title="What is not as printed", parts=(self._tabulate_differences(results, effort),), folded=True),
         ]
 
-    def _tabulate_headlines(self, found: Mapping[str, Mapping[str, Judgement]]) -> Table:
+    def _tabulate_headlines(self, judged: Mapping[str, Mapping[str, Judgement]]) -> Table:
         rows = []
-        for id in sorted(self.headlines, key=lambda id: next(iter(found[id].values())).verdict is Ruling.NOT_RUN):
-            claim, row = self.book.claims[id], found[id]
-            first, held = next(iter(row.values())), [at for at, one in row.items() if one.verdict is Ruling.HOLDS]
+        for id in sorted(self.headlines, key=lambda id: next(iter(judged[id].values())).verdict is Ruling.NOT_RUN):
+            claim, row = self.book.claims[id], judged[id]
+            first, held = next(iter(row.values())), [value for value, one in row.items() if one.verdict is Ruling.HOLDS]
             holds_in = "every reading" if len(held) == len(row) else "; ".join(held) or "no reading"
             run = first.verdict is not Ruling.NOT_RUN
             rows.append((claim.claim, _add_unit(claim), first.here, str(first.verdict), holds_in if run else ""))
         headings = ("claim", "printed", "here", "verdict", "holds in")
         return Table(name="headlines", columns=dict.fromkeys(headings, ""), rows=rows, prose=True)
 
-    def _fold(self, title: str, ids: Sequence[str], found: Mapping[str, Mapping[str, Judgement]]) -> Section:
+    def _fold(self, title: str, ids: Sequence[str], judged: Mapping[str, Mapping[str, Judgement]]) -> Section:
         readings = self._list_readings(ids[0]) if ids else {}
         rows = []
         for id in ids:
             claim = self.book.claims[id]
-            cells = [f"{one.verdict}: {one.here}" if one.here else str(one.verdict) for one in found[id].values()]
+            cells = [f"{one.verdict}: {one.here}" if one.here else str(one.verdict) for one in judged[id].values()]
             rows.append((claim.where, claim.claim, _add_unit(claim), claim.rule, claim.note, *cells))
         headings = (
             "where",
@@ -297,11 +298,11 @@ class Paper(Generic[E, R]):
         return Table(name="differences", columns=dict.fromkeys(headings, ""), rows=rows, prose=True)
 
 
-def count_verdicts(found: Mapping[str, Mapping[str, Judgement]]) -> str:
+def count_verdicts(judged: Mapping[str, Mapping[str, Judgement]]) -> str:
     """Return a sentence with the number of claims by verdict in the literal reading."""
-    counts = Counter(next(iter(row.values())).verdict for row in found.values())
+    counts = Counter(next(iter(row.values())).verdict for row in judged.values())
     return (
-        f"{len(found)} claims, in the literal reading: "
+        f"{len(judged)} claims, in the literal reading: "
         + ", ".join(f'{n} "{word}"' for word, n in counts.items())
         + "."
     )

@@ -83,8 +83,8 @@ def stairs_climb(*, stairs: int = 4, intervals: int = 50) -> GaitProblem:
         robot=make_rigid_bodies(),
         gravity=biped.GRAVITY,
         steps=stairs,
-        motion=lambda at, _: climb.compute_signals(at),
-        ground=lambda at, _: climb.list_treads(at),
+        motion=lambda point, _: climb.compute_signals(point),
+        ground=lambda point, _: climb.list_treads(point),
         planar=True,
     )
     return GaitProblem(
@@ -230,20 +230,20 @@ class Climb:
         angle += NOISE * rng.standard_normal(angle.shape)
         return step.join_start(angle, duration)
 
-    def compute_signals(self, at: NumericPoint) -> Signals:
+    def compute_signals(self, point: NumericPoint) -> Signals:
         """Return the whole climb on a dense grid, with every second step mirrored."""
-        blocks = self._split(at.x.full().ravel())
+        blocks = self._split(point.x.full().ravel())
         motions = {
-            part: make_signals(step.refine(step.layout.values(blocks[part]), float(at["step_time_s"])), 0.0)
+            part: make_signals(step.refine(step.layout.values(blocks[part]), float(point["step_time_s"])), 0.0)
             for part, step in self.steps.items()
         }
-        tread, rise = measure_stair(at)
+        tread, rise = measure_stair(point)
         places = np.outer(np.arange(len(self.sequence)), [tread, 0.0, rise, 0.0])
         return join_steps([motions[part] for part in self.sequence], make_rigid_bodies(), places)
 
-    def list_treads(self, at: NumericPoint) -> tuple[Tread, ...]:
+    def list_treads(self, point: NumericPoint) -> tuple[Tread, ...]:
         """Return the stairs ahead of the stance ankle of the first step."""
-        tread, rise = measure_stair(at)
+        tread, rise = measure_stair(point)
         return tuple(Tread(edge_m=k * tread - stair.SETBACK, height_m=k * rise) for k in range(1, self.stairs + 1))
 
 

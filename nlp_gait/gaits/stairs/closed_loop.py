@@ -161,7 +161,7 @@ class ClosedLoop:
         """Return the equations of the acceleration within one quantum."""
         q, v = state
         place, speed, push = self.locate_base(parts["hip"])
-        found = biped.locate_points(q, place, self.base_point)
+        places = biped.locate_points(q, place, self.base_point)
         motion = biped.make_dynamics(q, v, q, self.base_point)
         stair = Stair(parts["size"][0], parts["size"][1])
 
@@ -169,11 +169,11 @@ class ClosedLoop:
             height = point[1] - compute_stair_height(point[0], stair, SETBACK, EDGE_WIDTH)
             return Contact(height, ca.jacobian(point[1], q).T, ca.jacobian(point[0], q).T, speed[::-1])
 
-        contacts = [touch(found[name]) for name in CONTACTS if name != self.base_point]
+        contacts = [touch(places[name]) for name in CONTACTS if name != self.base_point]
         control, aim, ground = parts["control"], parts["desired"], Ground(*ca.vertsplit(parts["ground"]))
         disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1)
         if self.base == "hip":  # which accelerates the links
-            centres = biped.locate_centres(found)
+            centres = biped.locate_centres(places)
             momentum = sum((biped.get_rod(link).mass_kg * centre for link, centre in centres.items()), SX(2, 1))
             disturbance -= ca.inv(self.joints).T @ ca.jacobian(momentum, q).T @ push
         return quantised.implicit_quantum(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
@@ -188,8 +188,8 @@ class ClosedLoop:
 
         acceleration = (following.v - state.v) / QUANTUM
         place, _, push = self.locate_base(parts["hip"])
-        found = biped.locate_points(state.q, place, self.base_point)
-        centres = biped.locate_centres(found)
+        places = biped.locate_points(state.q, place, self.base_point)
+        centres = biped.locate_centres(places)
         accelerations = {link: self._accelerate(centre, state, acceleration) + push for link, centre in centres.items()}
         forces, spins = biped.compute_pushes(accelerations, acceleration)
         pull, weight = ca.vertsplit(sum(forces.values(), SX(2, 1)))

@@ -158,16 +158,16 @@ class IdealStep:
         }
         return step * effort, rows, indexes
 
-    def compute_signals(self, at: NumericPoint) -> Signals:
+    def compute_signals(self, point: NumericPoint) -> Signals:
         """Return time histories; values of intervals are those of their first instants, the last instant repeats the last one."""
-        values = self.layout.values(at.x.full().ravel())
+        values = self.layout.values(point.x.full().ravel())
         symbolic = self.compute_loads({name: MX(DM(value)) for name, value in values.items()})
         intervals = [*(np.array(ca.evalf(part)) for part in symbolic), values["acceleration"]]
         torque, force, pressure, acceleration = (np.concatenate([part, part[:, -1:]], axis=1).T for part in intervals)
         return Signals(
             joints=JOINTS,
             arrays={
-                "t": np.linspace(0.0, float(at["step_time_s"]), self.intervals + 1),
+                "t": np.linspace(0.0, float(point["step_time_s"]), self.intervals + 1),
                 **stair.make_joint_signals(values["angle"].T, values["rate"].T, acceleration),
                 "tau": torque,
                 "stance_force": force,
@@ -176,9 +176,9 @@ class IdealStep:
             columns=stair.COLUMNS,
         )
 
-    def simulate(self, at: NumericPoint) -> StepMotion:
+    def simulate(self, point: NumericPoint) -> StepMotion:
         """Return the step on a fine grid, for the engine."""
-        return self.refine(self.layout.values(at.x.full().ravel()), float(at["step_time_s"]))
+        return self.refine(self.layout.values(point.x.full().ravel()), float(point["step_time_s"]))
 
     def refine(self, values: Mapping[str, Array], duration_s: float) -> StepMotion:
         """Return the step of the blocks' values on a fine grid."""
@@ -241,8 +241,8 @@ class IdealStep:
     def _instant(self) -> ca.Function:
         """Swing toe, sole, ankle and hip (2,) from the stance ankle, and heights (3,) of the first three above the stair [m]."""
         q, size = SX.sym("q", len(MOVING)), SX.sym("size", 2)
-        found = biped.locate_points(biped.link_angles(q), SX(2, 1))
-        toe, sole, ankle, hip = (found[name] for name in "TSAH")
+        places = biped.locate_points(biped.link_angles(q), SX(2, 1))
+        toe, sole, ankle, hip = (places[name] for name in "TSAH")
         on = Stair(size[0], size[1])
         heights = [p[1] - compute_stair_height(p[0], on, stair.SETBACK, EDGE_WIDTH) for p in (toe, sole, ankle)]
         return ca.Function("places", [q, size], ca.cse([toe, sole, ankle, hip, ca.vertcat(*heights)]))
@@ -308,5 +308,5 @@ def _make_angles_function() -> ca.Function:
     """Function (tread and rise (2,), fractions of the phases (4,)) to link angles (7,)."""
     size, s = SX.sym("size", 2), SX.sym("s", 4)
     plan = StairPlan(hip_start=size[0] / 2 - HIP_BEHIND, **{name: SX(value) for name, value in PLAN.items()})
-    found = compute_posture(plan, Stair(size[0], size[1]), s, SX(4, 1), SX(REACH_MARGIN), Exact())
-    return ca.Function("angles", [size, s], [found.q.position])
+    places = compute_posture(plan, Stair(size[0], size[1]), s, SX(4, 1), SX(REACH_MARGIN), Exact())
+    return ca.Function("angles", [size, s], [places.q.position])

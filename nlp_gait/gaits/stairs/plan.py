@@ -111,23 +111,23 @@ def stairs_plan(
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         return _assemble(point, planned, minimise, ops)
 
-    def motion(at: NumericPoint) -> Signals:
-        samples = planned.samples(at, Exact())
+    def motion(point: NumericPoint) -> Signals:
+        samples = planned.samples(point, Exact())
         arrays = {name: np.array(ca.evalf(value)).T for name, value in samples._asdict().items()}
         moving = stair.make_joint_signals(*(arrays.pop(name) for name in ("q", "qd", "qdd")))
         renamed = {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
         renamed["power"] = arrays.pop("power")[:, : len(JOINTS)]
         return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays}, columns=stair.COLUMNS)
 
-    def step_motion(at: NumericPoint) -> StepMotion:
-        fine = PlannedStep(per_phase=FINE_INTERVALS).samples(at, Exact())
+    def step_motion(point: NumericPoint) -> StepMotion:
+        fine = PlannedStep(per_phase=FINE_INTERVALS).samples(point, Exact())
         t, q, qd, qdd, stance = (
             np.array(ca.evalf(part)).T for part in (fine.time, fine.q, fine.qd, fine.qdd, fine.stance_force)
         )
         new = np.diff(t[:, 0], prepend=-1.0) > 0.0  # where phases meet, the end of the earlier one
         t, q, qd, qdd, stance = (part[new] for part in (t, q, qd, qdd, stance))
         toe = compute_ground_force(q, qd, qdd) - stance
-        return make_standing_step(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe), float(at["t2_s"]))
+        return make_standing_step(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe), float(point["t2_s"]))
 
     model = make_simulation_model(step_motion) if balance == "feet" else None
     return GaitProblem(

@@ -230,9 +230,9 @@ def _list_outputs(inputs: list[SX], plan: StairPlan, step: Posture, *loads: SX) 
 def make_clearance_function(ops: Nonsmooth) -> ca.Function:
     """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``make_balanced_function``."""
     inputs, _, stair, step = make_step_symbols(ops)
-    found = biped.locate_points(biped.link_angles(step.q.position), SX(2, 1))
+    places = biped.locate_points(biped.link_angles(step.q.position), SX(2, 1))
     heights = [
-        found[name][1] - planned.compute_stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"
+        places[name][1] - planned.compute_stair_height(places[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"
     ]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
 

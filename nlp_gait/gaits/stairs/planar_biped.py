@@ -123,11 +123,11 @@ def locate_points(q: Sequence[SX] | SX, place: SX, base: str = "A'") -> dict[str
 
 def sum_along_links(base: str, place: V, along: Callable[[str], V]) -> dict[str, V]:
     """Return sums along the links from the base to every point, by the point's name."""
-    found = {base: place}
+    places = {base: place}
     for link, sense in _PATHS[base]:
         near, far = ENDS[link][::sense]
-        found[far] = found[near] + sense * along(link)
-    return found
+        places[far] = places[near] + sense * along(link)
+    return places
 
 
 def _compute_couplings(base: str) -> np.ndarray:
@@ -138,9 +138,9 @@ def _compute_couplings(base: str) -> np.ndarray:
     return middles.T @ np.diag([get_rod(link).mass_kg for link in LINKS]) @ middles
 
 
-def locate_centres(found: Mapping[str, SX]) -> dict[str, SX]:
+def locate_centres(places: Mapping[str, SX]) -> dict[str, SX]:
     """Centres of mass by link, (2,) each [m], from the points."""
-    return {link: (found[a] + found[b]) / 2 for link, (a, b) in ENDS.items()}
+    return {link: (places[a] + places[b]) / 2 for link, (a, b) in ENDS.items()}
 
 
 def compute_moment(place: SX, force: SX) -> SX:
@@ -216,13 +216,13 @@ def compute_loads(q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> StanceLoads
     the flat stance foot.
     """
     motion = make_dynamics(q, qd, link_angles(q))
-    found = locate_points(link_angles(q), SX(2, 1))
+    places = locate_points(link_angles(q), SX(2, 1))
     generalised = motion.M @ qdd + motion.C @ qd + motion.G  # (eq. 42)
     for point, force in rear.items():
-        generalised -= ca.jacobian(found[point], q).T @ force  # (eq. 35)
+        generalised -= ca.jacobian(places[point], q).T @ force  # (eq. 35)
     torque = DM(np.linalg.inv(JOINT_RATES.T)) @ generalised
 
-    middles = locate_centres(found)
+    middles = locate_centres(places)
     weight = load_toe_foot_biped().mass_kg * GRAVITY
     momentum = sum((get_rod(link).mass_kg * ca.jtimes(middles[link], q, qd) for link in LINKS), SX(2, 1))
     force = ca.jtimes(momentum, q, qd) + ca.jtimes(momentum, qd, qdd) + ca.vertcat(0, weight)

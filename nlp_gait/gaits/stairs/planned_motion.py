@@ -68,8 +68,8 @@ def compute_stair_height(x: SX, stair: Stair[SX], setback: float, width: float, 
     Below the first step there is only floor.
     """
 
-    def edge(at: SX | float) -> SX:
-        return 0.5 * (1 + ca.tanh((x - at + setback) / (2 * width)))
+    def edge(point: SX | float) -> SX:
+        return 0.5 * (1 + ca.tanh((x - point + setback) / (2 * width)))
 
     if step == "first":
         return stair.rise * edge(stair.tread)

@@ -171,9 +171,9 @@ class TrackedStep:
             },
         )
 
-    def compute_signals(self, at: NumericPoint) -> Signals:
+    def compute_signals(self, point: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
-        loop, found = self.loop, self.roll_out(at, Exact())
+        loop, found = self.loop, self.roll_out(point, Exact())
         parts = (*found[:4], loop.find_stance_ankle(found))
         desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
         joints = loop.joints.full().T
@@ -188,14 +188,14 @@ class TrackedStep:
             columns |= {kind.format("qd"): Columns(unit="rad/s", labels=labels)}
         return Signals(joints=self.angles, arrays=arrays, columns=columns)
 
-    def move(self, at: NumericPoint) -> StepMotion:
+    def move(self, point: NumericPoint) -> StepMotion:
         """Return the motion of the robot that the engine simulates."""
-        arrays = self.compute_signals(at).arrays
+        arrays = self.compute_signals(point).arrays
         state = np.hstack([arrays["link_q"], arrays["link_qd"]])
         on_links = arrays["tau"] @ self.loop.joints.full()
         desired = np.hstack([arrays[name] for name in ("q_desired", "qd_desired")])
         followed = np.hstack([half @ np.linalg.inv(self.loop.joints.full().T) for half in np.split(desired, 2, axis=1)])
-        step = make_driven_step(arrays["t"], state, on_links, arrays["zmp"], float(at["t2_s"]))
+        step = make_driven_step(arrays["t"], state, on_links, arrays["zmp"], float(point["t2_s"]))
         return step._replace(desired=followed)
 
 
