@@ -253,6 +253,8 @@ def minimize(
         SearchError: An argument is not allowed, or the objective answers with wrong shapes.
         Interrupted: Ctrl-C after at least one generation; carries the partial result.
     """
+    if stop is not None and not isinstance(stop, EarlyStop):
+        raise SearchError(f"stop must be made by EarlyStop(...), or None, got {abbreviate(stop)}")
     handling = Deb() if handling is None else handling
     preparation.check_budget(algorithm, evaluations)
     preparation.check_helpers(handling, callback)

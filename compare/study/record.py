@@ -211,6 +211,8 @@ def parse_record(raw: Any) -> RunRecord:
     if math.isnan(record.verdict.violation):
         record = replace(record, verdict=replace(record.verdict, violation=math.inf))
     decode(StoredProblem, record.inputs.problem, "inputs.problem")
+    if json.loads(json.dumps(replace_nan(asdict(record.inputs)))) != raw["inputs"]:
+        raise ValueError("inputs lack a field")  # a default would be another run's
     for text in (record.inputs.objective.name, record.inputs.objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
             raise ValueError(f"{text!r} is not a name or unit of an objective")

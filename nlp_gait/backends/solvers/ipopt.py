@@ -302,7 +302,7 @@ class _Run:
     problem: GaitProblem
     x0: Array  # (n,) start point
     bounds: dict[str, Array]  # of the NLP, by CasADi's names
-    started: float = field(default_factory=time.perf_counter)
+    started: float = field(default_factory=lambda: time.perf_counter())
     iterations: int = 0
     evaluations: Evaluations = field(default_factory=Evaluations)
     status: str = ""  # of the last stage: IPOPT's, or why it was ended

@@ -294,6 +294,8 @@ def make_recorded_gait(
 
 def _load_planned(gait: str, recorded: GaitProblem, x: Sequence[float], step_m: float) -> GaitProblem:
     options = {key: recorded.options[key] for key in ("robot", "intervals")}
+    if not step_m > 0.0:
+        raise InputError(f"the step is {step_m:g} m long, and a planned one must be longer than 0 m")
     problem = load(gait, **options) if gait == "nao-cycle" else load(gait, step_length_m=step_m, **options)
     fixed = dict(zip(recorded.names, x, strict=True))
     wider: dict[str, float] = {}

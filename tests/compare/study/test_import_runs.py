@@ -157,7 +157,9 @@ def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_pat
         rows = [r for r in csv.DictReader(file) if r["solver"] == "paper"]
     assert [(r["calls_f"], r["iterations"]) for r in rows] == [("100", ""), ("", ""), ("", "")]
     done = nlp_gait("report", out, "--logs")
-    assert "not in the logs: thesis, runs 0 to 2 of 3" in " ".join(done.stderr.split())
+    assert "not in the logs: thesis: the number of evaluations of 3 of 3 runs is unknown" in " ".join(
+        done.stderr.split()
+    )
     assert {path.name for path in (out / "logs").iterdir()} == {"GA"}
 
 
