@@ -8,13 +8,15 @@ Points are judged again when the new records are read; the report excludes those
 
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from compare.study.record import SCHEMA, RunRecord, parse_record
 from compare.study.record_files import write_records
-from compare.study.task import ProblemSpec
+from compare.study.task import Inputs, ProblemSpec
 from nlp_gait.backends.identity import identify_problem
+from nlp_gait.decoding import decode
 
 
 def convert(old: dict[str, Any]) -> RunRecord:
@@ -30,7 +32,8 @@ def convert(old: dict[str, Any]) -> RunRecord:
         inputs.pop("key", None)
     inputs["stop"] = {key: value for key, value in inputs.get("stop", {}).items() if value is not None}
     del old["seed"]
-    return parse_record({**old, "inputs": inputs, "schema": SCHEMA})
+    complete = asdict(decode(Inputs, inputs))  # with the defaults, which records of this release contain
+    return parse_record({**old, "inputs": complete, "schema": SCHEMA})
 
 
 if __name__ == "__main__":

@@ -131,8 +131,8 @@ def compute_ecdf(costs: Array) -> tuple[Array, Array]:
         Hansen et al. (2021), COCO, section 4 (runtime distributions).
     """
     solved = np.sort(costs[np.isfinite(costs)])
-    value, counts = np.unique(solved, return_counts=True)
-    return value, np.cumsum(counts) / max(len(costs), 1)
+    steps, counts = np.unique(solved, return_counts=True)
+    return steps, np.cumsum(counts) / max(len(costs), 1)
 
 
 def compute_profiles(costs: Mapping[str, Sequence[float]]) -> dict[str, tuple[Array, Array]]:

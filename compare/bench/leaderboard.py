@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -12,9 +11,9 @@ from compare.analysis.comparison import Comparison, compare_problems, index_solv
 from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
 from compare.bench.baseline import EVALUATIONS, get_reference, load_baseline
-from compare.drawing.charts import encode_charts, plot_charts
 from compare.drawing.comparison_figures import make_suite_ecdf_charts
-from compare.report.document import Document, Figure, Section, Table, make_text_table
+from compare.report.document import Document, Section, Table, make_text_table
+from compare.report.problem_section import make_chart_figure
 from compare.report.provenance import TERMS
 from compare.report.study_sections import make_wins_table
 from compare.study.record import RunRecord
@@ -104,19 +103,17 @@ def make_leaderboard_page(
     count_of = len(board.comparisons)
     runs = sorted({len(solver.records) for comparison in board.comparisons for solver in comparison.solvers})
     targets = ", ".join(f"{100 * target:g} %" for target in TARGETS)
-    charts = make_suite_ecdf_charts(board.comparisons)
     title = f"GaitBench, {suite}: {count_of} instances, {len(board.standings)} solvers"
     return Document(
         title=title if solver is None else f"{solver} on {title}",
         headline=() if solver is None else make_verdict(board, solver),
         parts=(
             _make_standings_table(board),
-            Figure(
-                name="gaitbench-runtime",
-                caption="Share of all triples of instance, run and target solved within a number of evaluations per variable; "
+            make_chart_figure(
+                "gaitbench-runtime",
+                "Share of all triples of instance, run and target solved within a number of evaluations per variable; "
                 "31 targets, from 100 % to 1e-4 % above the best known.",
-                drawing=partial(plot_charts, charts),
-                data=encode_charts(charts),
+                make_suite_ecdf_charts(board.comparisons),
             ),
             *(() if solver is None else (make_wins_table(board.comparisons, solver),)),
             Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),

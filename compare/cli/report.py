@@ -91,7 +91,7 @@ def reproduce(
 ) -> Output:
     """Recompute a paper's tables and figures next to the printed ones, and check its claims.
 
-    `claims.csv` has every claim with its verdict, `differences.csv` evidence.records that is not as printed with its effect.
+    `claims.csv` has every claim with its verdict, `differences.csv` what is not as printed, with its effect.
 
     Examples: `nlp-gait reproduce nao --out reproduction`, `nlp-gait reproduce walk12 --quick --out quick`,
     `nlp-gait reproduce stairs --effort effort.json --out reduced`

@@ -207,7 +207,7 @@ class Paper(Generic[E, R]):
             "effort": label,
             "settings": {k: v for k, v in asdict(effort).items() if v != getattr(self.full, k)},
             "session": asdict(session),
-            "verdicts": {id: {value: str(one.verdict) for value, one in row.items()} for id, row in judged.items()},
+            "verdicts": {id: {reading: str(one.verdict) for reading, one in row.items()} for id, row in judged.items()},
             "parts": [encode_part(part) for part in parts if not isinstance(part, Figure)],
         }
         write_json(folder / "summary.json", record)
@@ -225,7 +225,7 @@ class Paper(Generic[E, R]):
     def judge(self, results: Mapping[str, R], effort: E) -> dict[str, dict[str, Judgement]]:
         """Return the verdicts on all claims by reading; claims on runs are not run without runs."""
         return {
-            id: {value: self._judge(id, results, value, effort) for value in self._list_readings(id)}
+            id: {reading: self._judge(id, results, reading, effort) for reading in self._list_readings(id)}
             for id in self.book.claims
         }
 
@@ -235,10 +235,10 @@ class Paper(Generic[E, R]):
     def _judge(self, id: str, results: Mapping[str, R], reading: str, effort: E) -> Judgement:
         if id in self.book.on_runs and not effort.runs:
             return Judgement(Ruling.NOT_RUN)
-        claim, judged = self.book.claims[id], self.book.functions[id](results[reading])
-        if judged is not None and not isinstance(judged, Found):
-            judged = Found(judged)
-        return Judgement(decide(claim, judged), describe(claim, judged))
+        claim, found = self.book.claims[id], self.book.functions[id](results[reading])
+        if found is not None and not isinstance(found, Found):
+            found = Found(found)
+        return Judgement(decide(claim, found), describe(claim, found))
 
     def _make_parts(
         self, results: Mapping[str, R], judged: Mapping[str, Mapping[str, Judgement]], effort: E
@@ -261,7 +261,8 @@ class Paper(Generic[E, R]):
         rows = []
         for id in sorted(self.headlines, key=lambda id: next(iter(judged[id].values())).verdict is Ruling.NOT_RUN):
             claim, row = self.book.claims[id], judged[id]
-            first, held = next(iter(row.values())), [value for value, one in row.items() if one.verdict is Ruling.HOLDS]
+            first = next(iter(row.values()))
+            held = [reading for reading, one in row.items() if one.verdict is Ruling.HOLDS]
             holds_in = "every reading" if len(held) == len(row) else "; ".join(held) or "no reading"
             run = first.verdict is not Ruling.NOT_RUN
             rows.append((claim.claim, _add_unit(claim), first.here, str(first.verdict), holds_in if run else ""))

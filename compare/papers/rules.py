@@ -79,12 +79,12 @@ class ClaimRow:
         return np.array([float(value) for value in self.printed.split(" / ")])
 
 
-def decide(claim: ClaimRow, judged: Found | None) -> Ruling:
+def decide(claim: ClaimRow, found: Found | None) -> Ruling:
     """Return the verdict on a claim; None if there is no feasible result."""
-    if judged is None:
+    if found is None:
         return Ruling.NOT_SHOWN
     kind, amount, unit = claim.parts
-    ours, size = np.asarray(judged.values, dtype=float), amount or 0.0
+    ours, size = np.asarray(found.values, dtype=float), amount or 0.0
     if not np.isfinite(ours).all():
         return Ruling.NOT_SHOWN
     if kind == "within":
@@ -96,9 +96,9 @@ def decide(claim: ClaimRow, judged: Found | None) -> Ruling:
         change = rows[:, -1] - rows[:, 0]
         return _say(steady and bool(np.all((change > 0) & (change >= least * (1 - ROUNDING)))))
     if kind == "p <":
-        if judged.p is None:
+        if found.p is None:
             raise ValueError(f"{claim.id}: its rule needs a p-value")
-        return _say(bool(np.all(ours > 0))) if judged.p < size else Ruling.NOT_SHOWN
+        return _say(bool(np.all(ours > 0))) if found.p < size else Ruling.NOT_SHOWN
     if kind == "same order":
         return _say(np.array_equal(np.argsort(ours, kind="stable"), np.argsort(claim.values, kind="stable")))
     if kind == "rank":
@@ -129,11 +129,11 @@ def _say(holds: bool) -> Ruling:
     return Ruling.HOLDS if holds else Ruling.FAILS
 
 
-def describe(claim: ClaimRow, judged: Found | None) -> str:
+def describe(claim: ClaimRow, found: Found | None) -> str:
     """Return our numbers as a cell shows them; long series by their ends, runs by the rank of the printed value."""
-    if judged is None:
+    if found is None:
         return "no feasible result"
-    values = np.asarray(judged.values, dtype=float)
+    values = np.asarray(found.values, dtype=float)
     if claim.parts[0] == "rank":
         rank = int((values < claim.values[0]).sum())
         text = f"{values.min():.4g} to {values.max():.4g}{_space(claim.unit)}, rank {rank} of {values.size}"
@@ -141,7 +141,7 @@ def describe(claim: ClaimRow, judged: Found | None) -> str:
         signed = claim.printed[:1] in ("+", "-") and claim.parts[0] == "within"
         rows = [_join(row, signed) for row in np.atleast_2d(values)]
         text = "; ".join(rows) + _space(claim.unit)
-    return text if judged.p is None else f"{text}, p = {judged.p:.2g}"
+    return text if found.p is None else f"{text}, p = {found.p:.2g}"
 
 
 def _join(row: Sequence[float], signed: bool) -> str:

@@ -1,11 +1,11 @@
 """The first screen of a report on one problem: the gap of every run, the best gait, the table of solvers."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 from compare.analysis.columns import MAIN, Column, format_rows
 from compare.analysis.comparison import Comparison
-from compare.drawing.charts import encode_charts, plot_charts
+from compare.drawing.charts import Chart, encode_charts, plot_charts
 from compare.drawing.comparison_figures import make_convergence_charts, make_ecdf_charts, make_final_gap_charts
 from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
 from compare.report.document import Figure, Part, Section, Table, make_text_table
@@ -51,7 +51,12 @@ def make_figure(comparison: Comparison, name: str) -> Figure:
     compute, caption = FIGURES[name]
     charts = compute(comparison)
     stem = f"{make_file_name(comparison.problem)}-{name}"
-    return Figure(name=stem, caption=caption, drawing=partial(plot_charts, charts), data=encode_charts(charts))
+    return make_chart_figure(stem, caption, charts)
+
+
+def make_chart_figure(name: str, caption: str, charts: Sequence[Chart], columns: int = 2) -> Figure:
+    """Return the figure of charts, which the page draws itself."""
+    return Figure(name=name, caption=caption, drawing=partial(plot_charts, charts, columns), data=encode_charts(charts))
 
 
 def make_statistics_table(comparison: Comparison, columns: tuple[Column, ...], caption: str = "") -> Table:

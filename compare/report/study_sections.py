@@ -9,7 +9,6 @@ from compare.analysis.comparison import Comparison
 from compare.analysis.failures import describe_unknown
 from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers, rank_over_problems
 from compare.analysis.units import BY_UNIT
-from compare.drawing.charts import encode_charts, plot_charts
 from compare.drawing.comparison_figures import (
     list_expected_costs,
     make_profile_charts,
@@ -17,7 +16,7 @@ from compare.drawing.comparison_figures import (
 )
 from compare.drawing.gait_figure import GaitCurves, make_gait_charts
 from compare.report.document import Figure, Part, Prose, Section, Table, make_table_section, make_text_table
-from compare.report.problem_section import make_figure, make_statistics_table
+from compare.report.problem_section import make_chart_figure, make_figure, make_statistics_table
 from compare.report.provenance import TERMS, format_settings, make_solver_table
 from compare.report.writing import make_citation_section, make_session_section
 from compare.study.record import RunRecord
@@ -90,17 +89,14 @@ def _format_p(value: float) -> str:
 def list_optimum(comparison: Comparison, gaits: Mapping[str, GaitCurves] | str) -> tuple[Part, ...]:
     """Return active constraints with prices, the gaits over time, and limits between the samples."""
     charts = [] if isinstance(gaits, str) or not gaits else make_gait_charts(gaits)
-    curves = Figure(
-        name=f"{make_file_name(comparison.problem)}-curves",
-        caption="Best gait of each solver. The deviation is the largest distance of a joint from its place in the best gait "
+    caption = (
+        "Best gait of each solver. The deviation is the largest distance of a joint from its place in the best gait "
         "after the same share of the time. Mechanical power is the sum of |torque x rate| over the joints. The balance margin "
-        "is the distance of the zero-moment point from the nearest edge of the support polygon, negative outside of it.",
-        drawing=partial(plot_charts, charts, 3),
-        data=encode_charts(charts),
+        "is the distance of the zero-moment point from the nearest edge of the support polygon, negative outside of it."
     )
     return (
         *_list_active(comparison),
-        *((curves,) if charts else ()),
+        *((make_chart_figure(f"{make_file_name(comparison.problem)}-curves", caption, charts, 3),) if charts else ()),
         *_list_violated_between(comparison),
     )
 
@@ -205,14 +201,11 @@ def make_overview(comparisons: Sequence[Comparison]) -> Section:
         *(make_wins_table(comparisons, solver) for solver in list_user_solvers(comparisons)),
     ]
     if list_expected_costs(comparisons):
-        charts = make_profile_charts(comparisons)
         parts.append(
-            Figure(
-                name="performance-profile",
-                caption="Share of problems and targets that a solver reaches within a factor of the cheapest one's expected "
-                "evaluations.",
-                drawing=partial(plot_charts, charts),
-                data=encode_charts(charts),
+            make_chart_figure(
+                "performance-profile",
+                "Share of problems and targets that a solver reaches within a factor of the cheapest one's expected evaluations.",
+                make_profile_charts(comparisons),
             )
         )
     if ranking.critical_difference is not None:

@@ -212,7 +212,7 @@ def parse_record(raw: Any) -> RunRecord:
         record = replace(record, verdict=replace(record.verdict, violation=math.inf))
     decode(StoredProblem, record.inputs.problem, "inputs.problem")
     if json.loads(json.dumps(replace_nan(asdict(record.inputs)))) != raw["inputs"]:
-        raise ValueError("inputs lack a field")  # a default would be another run's
+        raise ValueError("inputs must have every field, defaults too")  # a default would be another run's
     for text in (record.inputs.objective.name, record.inputs.objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
             raise ValueError(f"{text!r} is not a name or unit of an objective")

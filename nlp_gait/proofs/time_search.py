@@ -147,7 +147,7 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
     numbers = frozenset(range(first, first + len(squares)))
     at_once = TimeRows(instants, averaged, given, kinks) if instants or averaged else None
     between = TimeRows(changes, [], [*given, later], kinks) if changes else None
-    sampled = tuple(c.name for kind in (None, "samples") for c in by_kind[kind])
+    sampled = tuple(c.name for c in by_kind[None])
     return TimeFunctions(source=source, instants=at_once, squares=numbers, changes=between, sampled=sampled)
 
 

@@ -114,7 +114,7 @@ class NaoResults:
     def lowest_hip_m(self, phase: str) -> float:
         """Return the lowest hip of the sweep at which there is a gait."""
         return min(
-            value for value, point in zip(HIPS_M, self.solved[f"hips-{phase}"], strict=True) if point["feasible"]
+            height for height, point in zip(HIPS_M, self.solved[f"hips-{phase}"], strict=True) if point["feasible"]
         )
 
     def final_powers(self, phase: str, search: str) -> list[float]:
@@ -181,9 +181,9 @@ def _make_computations(effort: NaoEffort) -> list[Any]:
         for phase in PHASES:
             spec = _make_spec(phase, reading)
             paths[f"{reading}/optimum-{phase}"] = spec, [{}]
-            paths[f"{reading}/hips-{phase}"] = spec, [{"hip_height_m": value} for value in HIPS_M]
-            paths[f"{reading}/durations-{phase}"] = spec, [{TIMES[phase]: value} for value in DURATIONS_S[phase]]
-        paths[f"{reading}/swings"] = _make_spec("ssp", reading), [{"swing_height_m": value} for value in SWINGS_M]
+            paths[f"{reading}/hips-{phase}"] = spec, [{"hip_height_m": height} for height in HIPS_M]
+            paths[f"{reading}/durations-{phase}"] = spec, [{TIMES[phase]: duration} for duration in DURATIONS_S[phase]]
+        paths[f"{reading}/swings"] = _make_spec("ssp", reading), [{"swing_height_m": height} for height in SWINGS_M]
     for share, arms in _list_shares():
         spec = _make_spec("dsp", "printed", torso_share=share, arms=arms)
         mean = evaluate(spec, PRINTED["dsp", "PSO"].x)["dbm_y_mean_m"]
@@ -341,7 +341,7 @@ def _root_mean(values: Any) -> float:
 def measure_relief(result: NaoResults) -> list[list[float]]:
     rows = []
     for phase in PHASES:
-        ends = [result.sample(phase, hip_height_m=value) for value in (result.lowest_hip_m(phase), HIPS_M[0])]
+        ends = [result.sample(phase, hip_height_m=height) for height in (result.lowest_hip_m(phase), HIPS_M[0])]
         for kind in ("Knee", "Ankle"):
             columns = [name[1:].startswith(kind) for name in ends[0].joints]
             rows.append([_root_mean(end.arrays["tau"][:, columns]) for end in ends])
@@ -387,7 +387,7 @@ def measure_swing_hip(result: NaoResults) -> list[float]:
 
 @BOOK.claim("swing-joints")
 def measure_swing_joints(result: NaoResults) -> list[float]:
-    ends = [result.sample("ssp", swing_height_m=value) for value in (0.015, 0.030)]
+    ends = [result.sample("ssp", swing_height_m=height) for height in (0.015, 0.030)]
     columns = [ends[0].joints.index(f"R{joint}Pitch") for joint in ("Hip", "Knee", "Ankle")]
     hip, knee, ankle = np.degrees(np.abs(ends[1].arrays["q"] - ends[0].arrays["q"]).max(axis=0)[columns])
     return [float(knee - hip), float(ankle - hip)]
@@ -530,9 +530,9 @@ def _tabulate_phase(results: Mapping[str, NaoResults], phase: str) -> Table:
 def _tabulate_swings(results: Mapping[str, NaoResults]) -> Table:
     rows = []
     for row in read_table("nao", "swing_heights"):
-        value, printed = float(row["swing_height_m"]), [float(row[f"{search}_W"]) for search in SEARCHES]
-        here = [results["printed"].measure("ssp", search, swing_height_m=value)["power_W"] for search in SEARCHES]
-        rows.append((value, *printed, *here, printed[0] - here[0], printed[1] - here[1]))
+        height, printed = float(row["swing_height_m"]), [float(row[f"{search}_W"]) for search in SEARCHES]
+        here = [results["printed"].measure("ssp", search, swing_height_m=height)["power_W"] for search in SEARCHES]
+        rows.append((height, *printed, *here, printed[0] - here[0], printed[1] - here[1]))
     headings = (
         "PSO, paper [W]",
         "GA, paper [W]",

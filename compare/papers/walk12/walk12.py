@@ -260,11 +260,11 @@ def compute_lead_by_print(result: Results) -> float:
     It is linear in the printed f and s, so the effect of their rounding is known; s is within (7).
     """
     leads = []
-    for value, row in permutations(TABLE_3, 2):
-        of_f = value.weight / row.weight
-        of_s = ((1 - value.weight) - (1 - row.weight) * of_f) / F2MAX
+    for other, row in permutations(TABLE_3, 2):
+        of_f = other.weight / row.weight
+        of_s = ((1 - other.weight) - (1 - row.weight) * of_f) / F2MAX
         ends = (row.s - DIGIT_M, min(row.s + DIGIT_M, F2MAX))
-        leads.append(of_f * (row.f - DIGIT_F) + min(of_s * s for s in ends) - (value.f + DIGIT_F))
+        leads.append(of_f * (row.f - DIGIT_F) + min(of_s * s for s in ends) - (other.f + DIGIT_F))
     return max(leads)
 
 

@@ -81,7 +81,7 @@ def make_landing_rates(body: Body) -> list[Variable]:
 def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
     """Return the variables of the state at a switch of ``SWITCHES``, whose names contain ``name``."""
     height, vz, _, vx, _, vy, _ = make_hip_variables(body)
-    point = f"at {name.replace('_', '-')}"
+    when = f"at {name.replace('_', '-')}"
     low, high = (round(share * body.leg_length_m, 3) for share in HIP_X_SHARES[switch])
     table = [
         ("hip_x", "m", low, high, f"{body.hip_name} ahead of the left foot"),
@@ -95,7 +95,7 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
         table.append((c.name, "rad", *c.bounds, c.words))
         table.append((c.rate, "rad/s", -c.largest_rate, c.largest_rate, c.rate_words))
     rows = (
-        (f"{what}_{name}_{SUFFIXES[unit]}", unit, lower, upper, f"{words}, {point}")
+        (f"{what}_{name}_{SUFFIXES[unit]}", unit, lower, upper, f"{words}, {when}")
         for what, unit, lower, upper, words in table
     )
     return list(make_variables(*rows))

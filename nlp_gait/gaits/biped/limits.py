@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
+from nlp_gait.errors import unknown
 from nlp_gait.formulation import Constraint, InstantPoint, Over, Parameter, Point
 from nlp_gait.formulation.assembly import make_parameters as table
 from nlp_gait.formulation.blocks import make_labels
@@ -16,8 +17,7 @@ from nlp_gait.gaits.biped.samples import BOTH_FEET, CORNERS, Samples
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-# Violations that count alike in the total, by unit: 10 mm of a margin or a height count like 1 rad, and like a change of a
-# foot's load that is too fast by a weight in 0.1 s.
+# Violations that count alike in the total, by unit: 10 mm of a margin or a height count like 1 rad.
 SCALES = {"rad": 1.0, "rad/s": 1.0, "Nm": 1.0, "N": 10.0, "m": 0.01, "1": 1.0, "1/s": 10.0, "N s": 0.1, "Nm s": 0.01}
 REACH_MARGIN = "reach_margin"
 TORQUE_CHANGE_NM = 1.2  # of NAO, over one interval
@@ -53,7 +53,12 @@ def make_rows(
     over: Over | None = None,
     size: float = 1.0,
 ) -> Constraint:
-    """Make rows with the scale of their unit; ``size`` is that of the robot's quantity relative to NAO's."""
+    """Make rows with the scale of their unit; ``size`` is that of the robot's quantity relative to NAO's.
+
+    Raises UnknownNameError for a unit without a scale.
+    """
+    if unit not in SCALES:
+        raise unknown("unit of rows", unit, SCALES)
     names, scale = tuple(labels), size * SCALES[unit]
     return Constraint(name=name, labels=names, unit=unit, scale=scale, value=value, lower=lower, upper=upper, over=over)
 

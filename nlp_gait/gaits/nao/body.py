@@ -125,8 +125,8 @@ def limit_ankle_roll(pitch: MX, column: int) -> MX:
     slopes = np.diff(corners[:, column]) / np.diff(corners[:, 0])
     turns = np.diff(np.concatenate([[0.0], slopes, [0.0]]))
     value = MX(corners[0, column])
-    for point, turn in zip(corners[:, 0].tolist(), turns.tolist(), strict=True):
-        value = value + turn * fmax(pitch - point, 0.0)
+    for corner, turn in zip(corners[:, 0].tolist(), turns.tolist(), strict=True):
+        value = value + turn * fmax(pitch - corner, 0.0)
     return value
 
 
@@ -164,9 +164,9 @@ class NaoBody(Body):
         reach = []
         for side, ankle in ankles.items():
             geometry = nao_joints.measure_leg(self.robot, side)
-            (point, *rates), (hip_at, *hip_rates) = ankle, hip
+            (ankle_at, *rates), (hip_at, *hip_rates) = ankle, hip
             moving = (a - b for a, b in zip(rates, hip_rates, strict=True))
-            hip_to_ankle = Motion(point - hip_at - DM(geometry.hip_m), *moving)
+            hip_to_ankle = Motion(ankle_at - hip_at - DM(geometry.hip_m), *moving)
             leg = leg_angles(hip_to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
             rows = (Motion(*(order[i] for order in leg.joints)) for i in range(len(nao_joints.LEG_JOINTS)))
             joints |= {f"{side}HipYawPitch": constant_motion(0.0)}

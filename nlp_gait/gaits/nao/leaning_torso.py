@@ -143,10 +143,10 @@ def _place_hips(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
 
 def _solve_turn(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
     """Solve for the torso's yaw and the hips' yaw-pitch (2,) with flat soles [rad], by Newton's method from zero."""
-    turn, point = SX.sym("turn", 2), SX.sym("pose", 5)
-    misfits = ca.vertcat(*(_compute_misfit(robot, side, turn, point, ankles[side]) for side in "LR"))
+    turn, symbol = SX.sym("turn", 2), SX.sym("pose", 5)
+    misfits = ca.vertcat(*(_compute_misfit(robot, side, turn, symbol, ankles[side]) for side in "LR"))
     slope = ca.jacobian(misfits, turn)
-    step = ca.Function("step", [turn, point], [turn - ca.inv_minor(slope) @ misfits])
+    step = ca.Function("step", [turn, symbol], [turn - ca.inv_minor(slope) @ misfits])
     solution = SX(2, 1)
     for _ in range(NEWTON_STEPS):
         solution = step(solution, pose)

@@ -159,7 +159,7 @@ class RecordedGait:
     motion: RecordedMotion  # on the left foot
     step_m: float  # from foot to foot
     lean_deg: float  # of the torso at the beginning
-    # Makes the planned problem with the same robot, step and durations; InputError if there is none
+    # Makes the planned problem with the same robot, step and durations; raises InputError if this gait has none
     make_planned: Callable[[], GaitProblem]
 
 

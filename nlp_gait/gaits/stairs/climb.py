@@ -24,7 +24,7 @@ from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import make_rigid_bodies, make_signals, measure_stair
-from nlp_gait.gaits.stairs.ideal import AXES, NOISE, PARAMETERS, IdealStep, make_equal_rows
+from nlp_gait.gaits.stairs.ideal import AXES, NOISE, PARAMETERS, IdealStep, make_equal_rows, make_ideal_step
 from nlp_gait.gaits.stairs.planar_biped import MOVING
 from nlp_gait.gaits.stairs.planned_motion import (
     Stair,
@@ -110,14 +110,7 @@ class Climb:
     @cached_property
     def steps(self) -> dict[ClimbPart, IdealStep]:
         """The distinct steps."""
-        sole_off, toe_off, _, end = stair.PAPER_TIMES
-        lifts = [max(1, round(time / end * self.intervals)) for time in (sole_off, toe_off)]
-        return {
-            part: IdealStep(
-                intervals=self.intervals, sole_off=lifts[0], toe_off=lifts[1], behind=part.behind, ahead=part.ahead
-            )
-            for part in PARTS
-        }
+        return {part: make_ideal_step(self.intervals, part.behind, part.ahead) for part in PARTS}
 
     @property
     def sequence(self) -> tuple[ClimbPart, ...]:

@@ -97,8 +97,8 @@ def compute_joint_angles(q: Array, *, rates: bool = False) -> Array:
 
 def compute_joint_torques(model: Array, stance_toe: Array) -> Array:
     """Return joint torques (T, 8) from ``compute_loads``' (T, 7) and the standing toe's (T,), which these lack [Nm]."""
-    places = {name: sense * model[:, biped.JOINTS.index(joint)] for name, (joint, sense) in MODEL_JOINT.items()}
-    return np.stack([places.get(name, stance_toe) for name in JOINTS], axis=1)
+    angles = {name: sense * model[:, biped.JOINTS.index(joint)] for name, (joint, sense) in MODEL_JOINT.items()}
+    return np.stack([angles.get(name, stance_toe) for name in JOINTS], axis=1)
 
 
 def _compute_turns(q: Array, share: float) -> dict[str, Array]:
@@ -131,7 +131,7 @@ def make_skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton
     samples = len(signals.arrays["t"])
     if history.shape[1] == len(biped.MOVING):
         history = np.hstack([history, np.zeros((samples, 2))])
-    point = _locate_points(history, signals.arrays.get("stance_ankle", np.zeros((samples, 2))))
+    places = _locate_points(history, signals.arrays.get("stance_ankle", np.zeros((samples, 2))))
     tread, rise = measure_stair(parameters)
     first, second = -SETBACK, tread - SETBACK
     edges = [(-1.6 * tread, -1), (first, -1), (first, 0), (second, 0), (second, 1), (1.8 * tread, 1)]
@@ -139,7 +139,7 @@ def make_skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton
     zmp = signals.arrays.get("zmp")
     if zmp is not None:
         zmp = _make_spatial(np.column_stack([zmp.reshape(samples, -1)[:, 0], np.zeros(samples)]))
-    lines = {side: np.stack([_make_spatial(point[name]) for name in names], axis=1) for side, names in LINES.items()}
+    lines = {side: np.stack([_make_spatial(places[name]) for name in names], axis=1) for side, names in LINES.items()}
     limbs = tuple(Limb(side=side, points=points) for side, points in lines.items())
     return Skeleton(t=signals.arrays["t"], limbs=limbs, soles=(), ground=ground, com=None, zmp=zmp, planar=True)
 
@@ -184,12 +184,12 @@ def make_standing_step(
     t: Array, q: Array, qd: Array, qdd: Array, toe: Array, sole: Array, double_support_s: float
 ) -> StepMotion:
     """Return a step over the flat stance foot from angles q (T, 7) [rad] and forces (T, 2) [N] on rear toe and sole joint."""
-    places = biped.make_loads("T", "S").map(len(t))(q.T, qd.T, qdd.T, toe.T, sole.T)
-    torque, stance, pressure = (np.array(part).T for part in places)
+    loads = biped.make_loads("T", "S").map(len(t))(q.T, qd.T, qdd.T, toe.T, sole.T)
+    torque, stance, pressure = (np.array(part).T for part in loads)
     flat = np.zeros((len(t), len(biped.LINKS) - len(biped.MOVING)))
     q, qd, qdd = (np.hstack([part, flat]) for part in (q, qd, qdd))
-    point = _locate_points(q)
-    carried = stance[:, 1] * pressure[:, 0] + toe[:, 1] * point["T"][:, 0] + sole[:, 1] * point["S"][:, 0]
+    places = _locate_points(q)
+    carried = stance[:, 1] * pressure[:, 0] + toe[:, 1] * places["T"][:, 0] + sole[:, 1] * places["S"][:, 0]
     whole = stance[:, 1] + toe[:, 1] + sole[:, 1]
     tau = compute_joint_torques(torque, _compute_stance_toe_torque(stance[:, 1], pressure[:, 0]))
     return StepMotion(t, q, qd, qdd, tau, carried / whole, double_support_s)

@@ -73,11 +73,7 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
         Robot, stair and phases of Bhardwaj et al.; the formulation is this package's own.
     """
     intervals = check_count("intervals", intervals, at_least=10)
-    sole_off, toe_off, _, step_time = (
-        stair.PAPER_TIMES
-    )  # when the rear sole and toe lift, in a step of other time in proportion
-    lifts = [max(1, round(time / step_time * intervals)) for time in (sole_off, toe_off)]
-    step = IdealStep(intervals=intervals, sole_off=lifts[0], toe_off=lifts[1])
+    step = make_ideal_step(intervals)
     model = make_simulation_model(step.simulate, repeats=True)
     return GaitProblem(
         name="stairs-ideal",
@@ -90,6 +86,13 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
         display=Display(motion=step.compute_signals, skeleton=make_skeleton, simulation_model=model),
         hints=SolverHints(start=step.start, starts=3, searchable=False),
     )
+
+
+def make_ideal_step(intervals: int, behind: int = 1, ahead: int = 1) -> "IdealStep":
+    """Return a step whose rear sole and toe lift when the paper's do, in proportion to its time; see ``IdealStep``."""
+    sole_off, toe_off, _, end = stair.PAPER_TIMES
+    lifts = [max(1, round(time / end * intervals)) for time in (sole_off, toe_off)]
+    return IdealStep(intervals=intervals, sole_off=lifts[0], toe_off=lifts[1], behind=behind, ahead=ahead)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -308,5 +311,5 @@ def _make_angles_function() -> ca.Function:
     """Function (tread and rise (2,), fractions of the phases (4,)) to link angles (7,)."""
     size, s = SX.sym("size", 2), SX.sym("s", 4)
     plan = StairPlan(hip_start=size[0] / 2 - HIP_BEHIND, **{name: SX(value) for name, value in PLAN.items()})
-    places = compute_posture(plan, Stair(size[0], size[1]), s, SX(4, 1), SX(REACH_MARGIN), Exact())
-    return ca.Function("angles", [size, s], [places.q.position])
+    posture = compute_posture(plan, Stair(size[0], size[1]), s, SX(4, 1), SX(REACH_MARGIN), Exact())
+    return ca.Function("angles", [size, s], [posture.q.position])

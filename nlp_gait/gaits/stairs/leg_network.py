@@ -86,17 +86,17 @@ def solve_legs_by_network(desired: MX, settings: NetworkSettings) -> MX:
     rows = ca.vertsplit(desired)
     for thigh, shank in LEGS:
         lengths = get_rod(thigh).length_m, get_rod(shank).length_m
-        point = [LINKS.index(thigh), LINKS.index(shank)]
-        point += [len(LINKS) + i for i in point]
+        places = [LINKS.index(thigh), LINKS.index(shank)]  # of angles, then of rates
+        places += [len(LINKS) + i for i in places]
         q, v, velocity = SX.sym("q", 2), SX.sym("v", 2), SX.sym("velocity", 2)
         reached = compute_leg_vector(q, *lengths)
         follow = ca.Function("follow", [q, v], [reached, ca.jtimes(reached, q, v)]).map(columns)
         rates = ca.Function("rates", [q, velocity], [compute_leg_rates(q, velocity, *lengths)]).map(columns)
         targets, velocities = follow(
-            ca.vertcat(*(rows[i] for i in point[:2])), ca.vertcat(*(rows[i] for i in point[2:]))
+            ca.vertcat(*(rows[i] for i in places[:2])), ca.vertcat(*(rows[i] for i in places[2:]))
         )
         angles, _, _ = make_training_path(settings, *lengths, columns)(DM(settings.first_weights), targets)
-        for i, row in zip(point, ca.vertsplit(ca.vertcat(angles, rates(angles, velocities))), strict=True):
+        for i, row in zip(places, ca.vertsplit(ca.vertcat(angles, rates(angles, velocities))), strict=True):
             rows[i] = row
     return ca.vertcat(*rows)
 

@@ -68,12 +68,12 @@ def compute_stair_height(x: SX, stair: Stair[SX], setback: float, width: float, 
     Below the first step there is only floor.
     """
 
-    def edge(point: SX | float) -> SX:
-        return 0.5 * (1 + ca.tanh((x - point + setback) / (2 * width)))
+    def smooth_edge(place: SX | float) -> SX:
+        return 0.5 * (1 + ca.tanh((x - place + setback) / (2 * width)))
 
     if step == "first":
-        return stair.rise * edge(stair.tread)
-    return stair.rise * (edge(0.0) + edge(stair.tread) - 1)
+        return stair.rise * smooth_edge(stair.tread)
+    return stair.rise * (smooth_edge(0.0) + smooth_edge(stair.tread) - 1)
 
 
 def compute_shank_gaps(points: Mapping[str, SX], stair: Stair[SX], setback: float, step: StepKind = "next") -> SX:

@@ -173,8 +173,8 @@ class TrackedStep:
 
     def compute_signals(self, point: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
-        loop, found = self.loop, self.roll_out(point, Exact())
-        parts = (*found[:4], loop.find_stance_ankle(found))
+        loop, rollout = self.loop, self.roll_out(point, Exact())
+        parts = (*rollout[:4], loop.find_stance_ankle(rollout))
         desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
         joints = loop.joints.full().T
         (q, qd), (q_desired, qd_desired) = (np.split(part, 2, axis=1) for part in (state, desired))

@@ -177,14 +177,14 @@ def compute_zmp(stance: Walk12Leg, swing: Walk12Leg, robot: PointMassBiped, read
     static_load = reading != "moment-free"
     above = DM([0.0, 0.0, ANKLE_HEIGHT_M]) if reading == "raised-ankle" else DM.zeros(3)
     position = motion.position if above.is_zero() else motion.position + above
-    point = zmp_of_point_masses(m, position, motion.acceleration, GRAVITY, static_load=static_load)
+    zmp = zmp_of_point_masses(m, position, motion.acceleration, GRAVITY, static_load=static_load)
     if reading != "appendix-as-printed":
-        return point
+        return zmp
     foot, knee, *hips_and_waist = ca.horzsplit(motion.position[:2, :])[:5]
     x_r = swing.ankle.position[0] - swing.hip.position[0]
     swing_knee, swing_foot = (ca.vertcat(x_r + p[0], -robot.hip_distance_m - p[1]) for p in (knee, foot))
     printed = ca.horzcat(foot, knee, *hips_and_waist, swing_knee, swing_foot)  # (eq. A1)
-    return point + (printed - motion.position[:2, :]) @ m / float(ca.sum1(m))
+    return zmp + (printed - motion.position[:2, :]) @ m / float(ca.sum1(m))
 
 
 def _measure_across(robot: PointMassBiped) -> DM:

@@ -164,8 +164,8 @@ def _make_zmp_function(robot: walk12_model.PointMassBiped, ops: Nonsmooth, readi
     x = SX.sym("x", len(VARIABLES))
     T, turn, margin, phase = (SX.sym(name) for name in ("T", "K", "margin", "phase"))
     stance, swing = walk12_model.compute_legs(x, phase, T, turn, margin, robot, ops)
-    point = walk12_model.compute_zmp(stance, swing, robot, reading)
-    return ca.Function("zmp", [x, T, turn, margin, phase], ca.cse([point]))
+    zmp = walk12_model.compute_zmp(stance, swing, robot, reading)
+    return ca.Function("zmp", [x, T, turn, margin, phase], ca.cse([zmp]))
 
 
 def _sample_zmp(zmp_at: ca.Function, point: Point, phases: MX | DM) -> MX:

@@ -129,10 +129,10 @@ def _make_form(problem: GaitProblem, robot: Robot, phase: PowerPhase) -> PowerFo
             out.add_row(changes[-1], -limit, limit)
         before = now.torques
         _add_pose_rows(out, robot, values, now)
-        for axis, point, (low, high) in zip("xy", ca.vertsplit(now.zmp), phase.sides, strict=True):
+        for axis, zmp, (low, high) in zip("xy", ca.vertsplit(now.zmp), phase.sides, strict=True):
             least = values[f"dbm_{axis}_min_limit_m"]
-            out.add_row(point, low + least, high - least, SCALES["m"])
-            margins[axis].append(phase.margins[axis](point))
+            out.add_row(zmp, low + least, high - least, SCALES["m"])
+            margins[axis].append(phase.margins[axis](zmp))
     means = {axis: sum(margins[axis], SX(0)) / (intervals + 1) for axis in "xy"}
     for axis, mean in means.items():
         out.add_row(mean, values[f"dbm_{axis}_mean_limit_m"], scale=SCALES["m"])
