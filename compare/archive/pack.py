@@ -23,7 +23,8 @@ from nlp_gait.errors import InputError
 from nlp_gait.files import read_bytes, replace_file
 from nlp_gait.proofs.certificate import CERTIFICATES, load_certificates
 from nlp_gait.robots import load_robot
-from nlp_gait.robots.loading import find_robot_file, list_robot_files
+from nlp_gait.robots.loading import list_robot_files
+from nlp_gait.robots.packages import find_robot_file
 from nlp_gait.user_code import Kind, hash_source, is_user_code, list_source_files, resolve_code
 
 README, LOCK = "README.md", "requirements.txt"

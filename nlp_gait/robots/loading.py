@@ -2,12 +2,10 @@
 
 import hashlib
 import os
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,14 +13,13 @@ from nlp_gait.decoding import decode, read_dataclass
 from nlp_gait.errors import RobotDataError, UnknownNameError, format_value, unknown, warn_once
 from nlp_gait.files import check_path, convert_errors
 from nlp_gait.robots.inference import EXTENTS, SIDES, Feet, Side, find_legs, infer_feet
+from nlp_gait.robots.packages import MARK, MODEL_ENDINGS, find_robot_file
 from nlp_gait.robots.perturbation import perturb, split_name
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, check_robot_name, make_unit_axis
 from nlp_gait.robots.tree import check_inertias, reverse_joint, shift_to_com
 from nlp_gait.robots.welding import Joints, Links, RobotParts, find_faults, weld_faults
 
-MODEL_ENDINGS = (".urdf", ".xml")
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
-PACKAGE_MARK = ":"  # between an installed package and one of its robots
 LONGEST_CHAIN = 8  # of robots that extend each other
 MOST_JOINTS = 400  # among which legs are searched, which takes 2 s then, and eight times as long for twice as many
 # Fields that replace those of the extended file.
@@ -79,7 +76,7 @@ def list_robots() -> tuple[str, ...]:
 def load_robot(name_or_path: str) -> Robot:
     """Load a robot by its name, or from a file: a path that ends in ``.json``, ``.urdf`` or, for MJCF, ``.xml``.
 
-    A URDF in an installed package is named ``PACKAGE:NAME``, see ``find_robot_file``.
+    A file of an installed package is named ``PACKAGE:NAME``, see ``robots/packages.py``.
 
     What such a file does not state is inferred, see ``robots/inference.py``; a ``.json`` of the same name next to it overrides
     both. Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``. A file is read
@@ -95,30 +92,7 @@ def load_robot(name_or_path: str) -> Robot:
 def is_robot_file(name_or_path: str) -> bool:
     """Return whether a robot comes from a file, its user's or an installed package's, instead of this package."""
     source = split_name(name_or_path)[0]
-    return source.endswith(FILE_ENDINGS) or PACKAGE_MARK in source
-
-
-def find_robot_file(name: str) -> str:
-    """Return the URDF of a robot in an installed package, ``example-robot-data:talos_reduced``; other names as they are.
-
-    After the package's name follows the file's name without its ending, or, for files of one name, their folder's.
-    """
-    if name.endswith(FILE_ENDINGS) or PACKAGE_MARK not in name:
-        return name
-    package, _, robot = name.partition(PACKAGE_MARK)
-    try:
-        files = [file.locate() for file in distribution(package).files or () if file.suffix == ".urdf"]
-    except PackageNotFoundError:
-        raise RobotDataError(
-            f"robot {name!r}: the package {package!r} is not installed; install it with pip, or give a file"
-        ) from None
-    stems = Counter(Path(str(file)).stem for file in files)
-    by_name = {
-        path.stem if stems[path.stem] == 1 else path.parent.name: str(path) for path in map(Path, map(str, files))
-    }
-    if robot not in by_name:
-        raise unknown(f"robot of {package!r}", robot, by_name)
-    return by_name[robot]
+    return source.endswith(FILE_ENDINGS) or MARK in source
 
 
 def hash_robot(name_or_path: object) -> str:

@@ -12,11 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlp_gait.errors import GaitError, InputError, RobotDataError, UnknownNameError, warn_once
+from nlp_gait.errors import GaitError, InputError, RobotDataError, warn_once
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.robots.leg import make_leg
-from nlp_gait.robots.loading import hash_robot
 from nlp_gait.robots.robot import Link
 from nlp_gait.robots.tree import find_partner, find_partners
 from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
@@ -203,28 +202,6 @@ def test_a_sole_without_collision_shape_is_that_of_the_visual_shape(tmp_path: Pa
     (tmp_path / "whole").mkdir()
     assert shown.feet == load_robot(crooked(tmp_path / "whole")).feet
     assert sum("lowest points of its visual shapes" in note for note in shown.notes) == 2
-
-
-def test_a_robot_of_an_installed_package_is_named_by_its_file_or_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for folder in ("one", "two"):
-        (tmp_path / folder).mkdir()
-        crooked(tmp_path / folder)
-    (tmp_path / "one" / "lonely.urdf").write_text(crooked_urdf(), encoding="utf-8")
-    info = tmp_path / "some_robots-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: some-robots\nVersion: 1.0\n", encoding="utf-8")
-    files = ("one/crooked.urdf", "two/crooked.urdf", "one/lonely.urdf", "some_robots-1.0.dist-info/METADATA")
-    (info / "RECORD").write_text("".join(f"{file},,\n" for file in files), encoding="utf-8")
-    monkeypatch.syspath_prepend(tmp_path)
-    whole = load_robot(str(tmp_path / "one" / "lonely.urdf"))
-    for name in ("some-robots:lonely", "some-robots:two", "some-robots:one"):
-        assert load_robot(name).feet == whole.feet and hash_robot(name)
-    with pytest.raises(UnknownNameError, match=r"unknown robot of 'some-robots' 'three'; known: lonely, one, two"):
-        load_robot("some-robots:three")
-    with pytest.raises(RobotDataError, match=r"'no-robots' is not installed; install it with pip"):
-        load_robot("no-robots:one")
 
 
 def test_a_foot_behind_a_fixed_joint_is_found(tmp_path: Path) -> None:

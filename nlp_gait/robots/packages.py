@@ -1,0 +1,136 @@
+"""Robots of installed packages: ``PACKAGE:NAME`` is a URDF or MJCF file among the package's own, or one that it fetches."""
+
+import difflib
+import os
+import pkgutil
+from collections import Counter
+from collections.abc import Callable, Mapping
+from functools import partial
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from typing import Any
+
+from nlp_gait.errors import RobotDataError, unknown
+
+MARK = ":"  # between an installed package and one of its robots
+MODEL_ENDINGS = (".urdf", ".xml")
+DESCRIPTION = "_description"  # end of the names of the modules of robot_descriptions
+HEAD_BYTES = 4096  # of an XML file, within which MJCF has its first tag
+
+Locate = Callable[[], str]  # returns the path of a robot's file
+
+
+def find_robot_file(name: str) -> str:
+    """Return the file of a robot in an installed package, ``example-robot-data:talos_reduced``; other names as they are.
+
+    A file is named without its ending or, if files share a name, by its folder, or else by both. Raises UnknownNameError with
+    the nearest names; RobotDataError for a package that is not installed, or does not provide the file.
+    """
+    if name.endswith((".json", *MODEL_ENDINGS)) or MARK not in name:
+        return name
+    package, _, robot = name.partition(MARK)
+    package, robot = SHORT_NAMES.get(package, package), robot.removesuffix(DESCRIPTION)
+    try:
+        robots = FINDERS.get(package, _list_files)(package)
+    except PackageNotFoundError:
+        near = difflib.get_close_matches(package, (*SHORT_NAMES, *KNOWN), n=1, cutoff=0.7)
+        meant = SHORT_NAMES.get(near[0], near[0]) if near else package
+        hint = "" if meant == package else f" (did you mean {meant!r}?)"
+        raise RobotDataError(
+            f"robot {name!r}: the package {package!r} is not installed{hint}; install it with pip install {meant}, or give a file"
+        ) from None
+    if robot not in robots:
+        raise unknown(f"robot of {package!r}", robot, robots)
+    try:
+        return robots[robot]()
+    except Exception as error:  # any error of a package that downloads its robots
+        raise RobotDataError(
+            f"robot {name!r}: the package {package!r} does not provide it ({error}); it downloads its robots on first use"
+        ) from error
+
+
+def list_package_robots(package: str) -> tuple[str, ...]:
+    """Return the names of all robots of an installed package; raises PackageNotFoundError."""
+    package = SHORT_NAMES.get(package, package)
+    return tuple(sorted(FINDERS.get(package, _list_files)(package)))
+
+
+def _list_files(package: str) -> Mapping[str, Locate]:
+    """Return the URDF and MJCF files of a package by name, without scenes, which contain a robot's file."""
+    paths = [Path(str(file.locate())) for file in distribution(package).files or () if file.suffix in MODEL_ENDINGS]
+    models = [path for path in paths if not path.stem.startswith("scene") and _is_robot(path)]
+    named: dict[str, Locate] = {}
+    for name_of in (_name_by_file, _name_by_folder, _name_by_both, str):
+        names = {path: name_of(path) for path in models}
+        counts = Counter((*names.values(), *named))
+        named |= {name: path.__str__ for path, name in names.items() if counts[name] == 1}
+        models = [path for path, name in names.items() if counts[name] > 1]
+    return named
+
+
+def _name_by_file(path: Path) -> str:
+    return path.stem
+
+
+def _name_by_folder(path: Path) -> str:
+    return path.parent.name
+
+
+def _name_by_both(path: Path) -> str:
+    return f"{path.parent.name}/{path.stem}"
+
+
+def _is_robot(path: Path) -> bool:
+    if path.suffix == ".urdf":
+        return True
+    try:
+        with path.open("rb") as file:
+            return b"<mujoco" in file.read(HEAD_BYTES)
+    except OSError:
+        return False
+
+
+def _list_menagerie(package: str) -> Mapping[str, Locate]:
+    """Return the robots of MuJoCo's menagerie, which the package downloads, or reads below ``MENAGERIE_ROOT``."""
+    distribution(package)
+    robots = import_module("mujoco_menagerie").robots()
+    return {robot.name: partial(_fetch_model, robot) for robot in robots}
+
+
+def _fetch_model(robot: Any) -> str:
+    return str(robot.xml(robot.default_model))
+
+
+def _list_descriptions(package: str) -> Mapping[str, Locate]:
+    """Return the modules of ``robot_descriptions``, each of which clones its robot's repository when it is imported."""
+    distribution(package)
+    modules = [module.name for module in pkgutil.iter_modules(import_module("robot_descriptions").__path__)]
+    described = [name for name in modules if name.endswith(DESCRIPTION) and not name.startswith("_")]
+    return {name.removesuffix(DESCRIPTION): partial(_import_description, name) for name in described}
+
+
+def _import_description(name: str) -> str:
+    module = import_module(f"robot_descriptions.{name}")
+    paths = [str(getattr(module, kind)) for kind in ("URDF_PATH", "MJCF_PATH") if hasattr(module, kind)]
+    if not paths or not os.path.isfile(paths[0]):
+        raise FileNotFoundError("it has neither a URDF nor an MJCF file")
+    return paths[0]
+
+
+SHORT_NAMES = {"menagerie": "mujoco-menagerie", "robot_descriptions": "robot-descriptions"}
+# Packages whose robots are not among their own files.
+FINDERS: Mapping[str, Callable[[str], Mapping[str, Locate]]] = {
+    "mujoco-menagerie": _list_menagerie,
+    "robot-descriptions": _list_descriptions,
+}
+# With humanoids, as far as we know; any other installed package serves, too.
+KNOWN = (
+    *FINDERS,
+    "armar",
+    "example-robot-data",
+    "fourier-robot-descriptions",
+    "icub-models",
+    "jvrc-description",
+    "mjlab",
+)
