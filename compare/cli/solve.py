@@ -1,6 +1,6 @@
 """``nlp-gait solve`` and ``nlp-gait plan``."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -15,6 +15,7 @@ from compare.cli.command import OUTPUT_FILE, command, report_interrupts
 from compare.cli.printing import Output, Rows, fail, say, show_progress, tabulate
 from compare.study.references import find_reference
 from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.plan_walk import MARGINS as MARGINS_OF_SOLE
 from nlp_gait.backends.plan_walk import WalkSettings
 from nlp_gait.backends.solvers import registry
 from nlp_gait.errors import OutputError
@@ -23,11 +24,18 @@ from nlp_gait.formulation.solution import Solution
 from nlp_gait.interrupts import Interrupted
 from nlp_gait.proofs.guarantee import guarantee
 
+SHOWN_MARGINS = 4
 LINEAR_SOLVER = "Linear solver of IPOPT, for example ma57 if its library is installed (default: mumps)."
 SPEEDS = "Speeds of the inner steps [m/s], separated by commas; between them it changes evenly."
 TURN = "Turn to the left along an arc, by 15 degrees with each step unless --steps; negative turns to the right."
 FOOTHOLDS = "CSV file with columns x_m,y_m,z_m,yaw_deg: where the right foot, the left foot and so on land."
 OF_A_WALK = "intervals (of each phase), or a parameter or bound of nao-walk or humanoid-walk; repeatable."
+
+
+MARGINS = (
+    f"Least distance of the ZMP from the edges of its support, as shares of a sole's length and width (default: "
+    f"{MARGINS_OF_SOLE[0]:g},{MARGINS_OF_SOLE[1]:g}); 0,0 for the cheapest walk."
+)
 
 
 @command
@@ -134,6 +142,7 @@ def plan(
     ] = "",
     turn_deg: Annotated[float, Option(help=TURN)] = 0.0,
     footholds: Annotated[Path | None, Option(help=FOOTHOLDS)] = None,
+    margins: Annotated[str | None, Option(metavar="ALONG,ACROSS", help=MARGINS)] = None,
     values: Annotated[list[str] | None, Option("--set", metavar="NAME=VALUE", help=OF_A_WALK)] = None,
     limits: options.Limits = None,
     starts: Annotated[int, Option(min=1, max=100, help="Most start points, until one converges.")] = 3,
@@ -148,7 +157,8 @@ def plan(
     pairs = [("intervals", given.pop("intervals", "10")), ("limits", ",".join(limits or ()))]
     numbers = {name: options.parse_number(name, text, "--set") for name, text in given.items()}
     of_phases = options.parse_options("nao-walk", pairs)
-    settings = WalkSettings(values=numbers, starts=starts, progress=say, **of_phases)
+    least = None if margins is None else options.parse_numbers("a margin", margins, "--margins")
+    settings = WalkSettings(values=numbers, margins=least, starts=starts, progress=say, **of_phases)
     if turn_deg or footholds is not None or speeds:
         if (speed, stairs, slope_deg) != (None, "", 0.0):
             fail("a walk whose steps differ is on a level floor; leave out --speed, --slope-deg and --stairs")
@@ -176,8 +186,17 @@ def plan(
         data=walk.to_json(),
         parts=[
             f"{walk.steps} steps, {walk.distance_m:.3f} m in {walk.duration_s:.2f} s: {walk.energy_J:.2f} J, "
-            f"{walk.energy_J / walk.distance_m:.2f} J/m" + ("" if step is None else f"; steps of {step:.4f} m")
+            f"{walk.energy_J / walk.distance_m:.2f} J/m" + ("" if step is None else f"; steps of {step:.4f} m"),
+            *(_describe_margins(walk.active_margins) if walk.feasible else ()),
         ],
         written=[] if out is None else [out],
         failures=[] if walk.feasible else ["no feasible walk was found. " + ". ".join(walk.obstacles)],
     )
+
+
+def _describe_margins(active: Sequence[str]) -> Iterator[str]:
+    if not active:
+        yield "No balance margin is active"
+        return
+    more = f"; and {len(active) - SHOWN_MARGINS} more" if len(active) > SHOWN_MARGINS else ""
+    yield f"Active margins: {'; '.join(active[:SHOWN_MARGINS])}{more}"

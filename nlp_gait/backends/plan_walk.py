@@ -22,6 +22,7 @@ from nlp_gait.gaits.biped.body import TIMED_UNITS, Body
 from nlp_gait.gaits.biped.cycle_motion import STEP
 from nlp_gait.gaits.biped.footholds import list_arc, list_swings, parse_footholds, read_footholds
 from nlp_gait.gaits.biped.footstep_walk import name_speed
+from nlp_gait.gaits.biped.support_phases import compute_sole_margins
 from nlp_gait.gaits.biped.walk_sections import GREATEST_SPEED, HALF_STEPS, LEAST_SPEED, start_from_cycle
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.gaits.humanoid.turning import list_turn
@@ -30,7 +31,16 @@ from nlp_gait.progress import Progress, ignore_progress
 
 NAO_WALK = "nao-walk"
 AT_BOUND = 1e-4  # share of a variable's range
+# Default least margins of the ZMP in a plan, along and across, as shares of a sole's length and width; chosen by energy against
+# the push survived, see ``benchmarks/humanoids.py``.
+MARGINS = (0.06, 0.08)
 MANY_SOLVES = 10  # compiled functions pay, because they suit walks of any length and speed
+LEAST_MARGINS = ("dbm_x_min_limit_m", "dbm_y_min_limit_m")  # ends of the names of parameters
+MARGIN_WORDS = {
+    f"dbm_{axis}{end}": f"{kind} margin {word}"
+    for axis, word in (("x", "along"), ("y", "across"))
+    for end, kind in (("", "least"), ("_mean", "mean"))
+}
 REMEDIES = files(__package__).joinpath("walk_remedies.toml")
 SENTENCES: Mapping[str, Mapping[str, Any]] = tomllib.loads(REMEDIES.read_text(encoding="utf-8"))
 
@@ -63,6 +73,22 @@ class WalkPlan:
         return (*rows, *describe_own_bounds(self.solution.problem, self.solution.x))
 
     @property
+    def active_margins(self) -> tuple[str, ...]:
+        """Sentences that name the balance margins at their limits and their prices, the dearest first."""
+        prices: dict[tuple[str, str], float] = {}
+        bounds: dict[tuple[str, str], float] = {}
+        for active in self.solution.active_constraints:
+            where, stem = find_place(active.name.partition("[")[0], self.steps)
+            if stem in MARGIN_WORDS:
+                prices[where, stem] = prices.get((where, stem), 0.0) + abs(active.price)
+                bounds[where, stem] = active.bound
+        ordered = sorted(prices, key=lambda key: -prices[key])
+        return tuple(
+            f"{where}: {MARGIN_WORDS[stem]} of {1e3 * bounds[where, stem]:.1f} mm, {prices[where, stem] / 1e3:.2g} J/m per mm"
+            for where, stem in ordered
+        )
+
+    @property
     def result(self) -> Result:
         """The walk as a result, for signals, simulation and export."""
         return Result(problem=self.solution.problem, x=self.solution.best.x)
@@ -71,7 +97,8 @@ class WalkPlan:
         """Return the plan as plain data, from which ``load_result`` reads it."""
         names = ("feasible", "energy_J", "distance_m", "duration_s", "steps")
         numbers = {name: getattr(self, name) for name in names}
-        return {**self.solution.to_json(), **numbers, "obstacles": list(self.obstacles)}
+        sentences = {name: list(getattr(self, name)) for name in ("obstacles", "active_margins")}
+        return {**self.solution.to_json(), **numbers, **sentences}
 
     def save(self, path: str | Path) -> None:
         """Write the plan to a JSON file for ``nlp-gait simulate`` and ``export``; raises OutputError."""
@@ -85,6 +112,8 @@ class WalkSettings:
     intervals: int = 10  #: of each phase
     limits: str = ""  #: added to every phase: names separated by commas, see ``nlp_gait.limits``
     values: Mapping[str, float] = field(default_factory=dict)  #: parameters and bounds of the problem, by name
+    #: Least margins of the ZMP along and across, as shares of a sole; None for ``MARGINS``, or the problem's own if larger
+    margins: Sequence[float] | None = None
     starts: int = 3  #: most start points, until one converges
     progress: Progress = ignore_progress  #: receives a line about each start
 
@@ -92,6 +121,20 @@ class WalkSettings:
     def options(self) -> dict[str, Any]:
         """Those that are options of the problem."""
         return {"intervals": self.intervals, "limits": self.limits}
+
+    def apply(self, problem: GaitProblem) -> GaitProblem:
+        """Return a walk with these margins and values; raises InputError for a margin that no sole has."""
+        shares = MARGINS if self.margins is None else self.margins
+        if len(shares) != 2 or not all(0.0 <= share < 0.5 for share in shares):
+            raise InputError(f"margins must be two shares of a sole, each from 0 to less than 0.5, got {shares}")
+        along, across = shares
+        assert problem.display.robot is not None
+        least_m = compute_sole_margins(problem.display.robot.feet["left"], (along, across))
+        ends = list(zip(LEAST_MARGINS, least_m, strict=True))
+        values = {name: m for name in problem.parameter_values for end, m in ends if name.endswith(end)}
+        if self.margins is None:
+            values = {name: max(value, problem.value(name)) for name, value in values.items()}
+        return problem.with_values(**{**values, **self.values})
 
 
 def plan_walk(
@@ -123,7 +166,7 @@ def plan_walk(
         natural = problem.by_name(problem.start_point(np.random.default_rng(0)))[STEP]
         count = max(HALF_STEPS, round(distance_m / natural) + 1)
         problem = load(walk, **{**problem.options, "steps": count})
-    problem = _fix_speed(problem.with_values(**settings.values), speed_m_s)
+    problem = _fix_speed(settings.apply(problem), speed_m_s)
     if distance_m is not None:
         problem = _fix_step(problem, distance_m)
     cycle = None if walk == NAO_WALK else _load_cycle(problem, None)
@@ -143,7 +186,7 @@ def plan_climb(
         raise InputError(f"stairs must be RISExRUN:N with rise and run in metres, such as 0.03x0.24:3, got {stairs!r}")
     flight = {"stair_rise_m": float(sizes[1]), "stair_run_m": float(sizes[2])}
     problem = load("humanoid-walk", robot=robot, steps=int(sizes[3]) + 1, **flight, **settings.options)
-    problem = _fix_speed(problem.with_values(**settings.values), speed_m_s)
+    problem = _fix_speed(settings.apply(problem), speed_m_s)
     return _solve(problem, _load_cycle(problem, None), settings)
 
 
@@ -194,7 +237,7 @@ def plan_route(
             "turns are planned for legs whose hip joints turn one by one"
         )
     problem = load(walk, robot=robot, steps=len(places), footholds=text, **settings.options)
-    problem = problem.with_values(**{**list_speeds(speeds_m_s, len(places)), **settings.values})
+    problem = settings.apply(problem.with_values(**list_speeds(speeds_m_s, len(places))))
     swings = list_swings(places, body.feet_y)
     step_m = sum(landed.x for _, landed in swings) / max(len(swings) - 1, 1)
     return _solve(problem, _load_cycle(problem, step_m), settings)
@@ -302,19 +345,23 @@ def describe_own_bounds(problem: GaitProblem, x: Mapping[str, float]) -> list[st
     return [f"it reaches bounds of this package, not of the robot: {', '.join(reached)}; --set moves them"]
 
 
+def find_place(name: str, steps: int) -> tuple[str, str]:
+    """Return where in a walk of so many steps a row of that name is, and the rest of its name."""
+    if step := re.match(r"step(\d+)_(ssp_|dsp_)?", name):  # of a walk whose steps differ
+        support = {"ssp_": ", single support", "dsp_": ", double support"}.get(step[2], "")
+        return f"step {step[1]}{support}", name.removeprefix(step[0])
+    prefix = next(begin for begin in SENTENCES["places"] if name.startswith(begin))
+    where = SENTENCES["places"][prefix].format(steps=steps, inner=f"steps 2 to {steps - 1}" if steps > 3 else "step 2")
+    return where, name.removeprefix(prefix)
+
+
 def describe_violation(row: ConstraintValue, steps: int) -> str:
     """Return a sentence about a violated row of a walk: step, constraint, amount and remedy."""
-    begins = SENTENCES["places"]
-    if step := re.match(r"step(\d+)_(ssp_|dsp_)?", row.name):  # of a walk whose steps differ
-        support = {"ssp_": ", single support", "dsp_": ", double support"}.get(step[2], "")
-        prefix, where = step[0], f"step {step[1]}{support}"
-    else:
-        prefix = next(begin for begin in begins if row.name.startswith(begin))
-        where = begins[prefix].format(steps=steps, inner=f"steps 2 to {steps - 1}" if steps > 3 else "step 2")
-    stem, _, label = row.name.removeprefix(prefix).partition("[")
+    where, name = find_place(row.name, steps)
+    stem, _, label = name.partition("[")
     begin = next(begin for begin in SENTENCES["constraints"] if stem.startswith(begin))
     words, remedy = SENTENCES["constraints"][begin]
-    if prefix.startswith("stand_"):
+    if row.name.startswith("stand_"):
         remedy = SENTENCES["standing"].get(begin, remedy)
     owner = label.rstrip("]").split(",")[0].strip()
     what = f"{stem} {words}" if not owner or owner.isdigit() else f"{owner} {words}"

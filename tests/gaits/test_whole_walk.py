@@ -11,10 +11,12 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.plan_walk import WalkPlan, describe_violation, plan_climb, plan_walk
+from nlp_gait.backends.plan_walk import MARGINS, WalkPlan, WalkSettings, describe_violation, plan_climb, plan_walk
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.formulation.solution import ConstraintValue
+from nlp_gait.gaits.biped.footholds import list_arc
+from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import Conditions
 from nlp_gait.symbolic.dynamics import tilt_gravity
@@ -119,11 +121,43 @@ def test_a_plan_is_feasible_and_walks_in_the_engine(tmp_path: Path) -> None:
     assert again.problem.options["steps"] == 3 and again.problem.by_name(again.x) == data["x"]
     indexes = build_exact_model(again.problem).at(again.x, again.problem.p).indexes
     assert [data[name] for name in ("energy_J", "duration_s")] == [indexes["energy_J"], indexes["duration_s"]]
+    assert (
+        indexes["ssp_dbm_x_min_m"] > MARGINS[0] * 0.15 - 1e-6 and indexes["ssp_dbm_y_min_m"] > MARGINS[1] * 0.08 - 1e-6
+    )
+    active = {active["name"] for active in data["active_constraints"] if active["name"].startswith("ssp_dbm_y_mean")}
+    inner = [
+        text for text in data["active_margins"] if text.startswith("step 2, single support: mean margin across of 20.0")
+    ]
+    assert len(active) == len(inner)
     simulated = as_json("simulate", path)
     assert not simulated["fallen"] and simulated["planned_m"] == pytest.approx(0.1)
     assert simulated["walked_m"] > 0.98 * simulated["planned_m"]
     # Three samples a phase are too few for the energy of the plan; the model's is computed on a dense grid.
     assert simulated["energy_J"] == pytest.approx(simulated["walk"]["model_J_per_m"] * 0.1, rel=0.1)
+
+
+def test_margins_are_shares_of_the_sole_in_plans_and_not_in_problems(problem: GaitProblem) -> None:
+    least = [f"{kind}_dbm_{axis}_min_limit_m" for kind in ("ssp", "dsp", "stand") for axis in "xy"]
+    assert {problem.value(name) for name in least} == {0.0}
+    planned = WalkSettings().apply(problem)
+    assert [planned.value(name) for name in least] == 3 * [
+        pytest.approx(MARGINS[0] * 0.15),
+        pytest.approx(MARGINS[1] * 0.08),
+    ]
+    chosen = WalkSettings(margins=(0.2, 0.1), values={"ssp_dbm_x_min_limit_m": 0.001}).apply(problem)
+    assert [chosen.value(name) for name in least] == pytest.approx([0.001, 0.008, 0.03, 0.008, 0.03, 0.008])
+    for shares in ((0.5, 0.1), (-0.1, 0.1), (0.1,), (float("nan"), 0.1)):
+        with pytest.raises(InputError, match="two shares of a sole"):
+            WalkSettings(margins=shares).apply(problem)
+
+
+def test_a_walk_along_footholds_keeps_its_larger_margins_unless_told_otherwise() -> None:
+    text = list_arc(0.0, 3, 0.1, make_nao("nao-v5").feet_y)
+    route = nlp_gait.load("nao-walk", steps=3, footholds=text)
+    own = route.value("ssp_dbm_x_min_limit_m")
+    assert own == pytest.approx(0.15 / 4)
+    assert WalkSettings().apply(route).value("ssp_dbm_x_min_limit_m") == own
+    assert WalkSettings(margins=(0.0, 0.0)).apply(route).value("ssp_dbm_x_min_limit_m") == 0.0
 
 
 @pytest.mark.parametrize(
