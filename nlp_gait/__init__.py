@@ -13,6 +13,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from compare.report.compared_study import compare as compare
     from nlp_gait.backends.kernel.compiled import CompiledObjective as CompiledObjective
     from nlp_gait.backends.kernel.compiled import compile_objective as compile_objective
     from nlp_gait.backends.kernel.compiled_function import CompiledFunction as CompiledFunction
@@ -42,6 +43,7 @@ _PUBLIC = {
     "nlp_gait.backends.solve": "solve",
     "nlp_gait.backends.solvers.ipopt": "IpoptSettings",
     "nlp_gait.backends.solvers.registry": "make_solver",
+    "compare.report.compared_study": "compare",
 }
 _PLACES = {name: f"{module}:{name}" for module, names in _PUBLIC.items() for name in names.split()}
 __all__ = sorted(_PLACES)

@@ -9,7 +9,7 @@ from statistics import median
 import numpy as np
 
 from compare.analysis.best_known import ZERO, compute_gap, is_zero
-from compare.analysis.pairs import Pair, compare_pairs
+from compare.analysis.pairs import Pair, compare_pairs, describe_power
 from compare.analysis.record_statistics import (
     Curve,
     Weighting,
@@ -115,6 +115,11 @@ class Comparison:
         """Tests of all pairs of solvers; differences within the judge's tolerance are ties."""
         tied = tie([solver.costs for solver in self.solvers], self.reference)
         return compare_pairs({solver.name: costs for solver, costs in zip(self.solvers, tied, strict=True)})
+
+    @property
+    def power(self) -> str:
+        """Why no difference can be significant, see ``describe_power``; empty if one can."""
+        return describe_power([len(solver.records) for solver in self.solvers])
 
     @property
     def leaders(self) -> set[str]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, count
 
 from compare.analysis.record_statistics import compute_a12, compute_rank_sum, correct_by_holm
 
@@ -34,3 +34,22 @@ def compare_pairs(costs: Mapping[str, Sequence[float]]) -> list[Pair]:
         Pair(first=a, second=b, rank_sum=float(p), a12=compute_a12(costs[a], costs[b]))
         for (a, b), p in zip(pairs, corrected, strict=True)
     ]
+
+
+def describe_power(runs: Sequence[int]) -> str:
+    """Say that too few runs of each solver allow no significant difference, and how many do; empty if they suffice."""
+    pairs = list(combinations([number for number in runs if number > 1], 2))
+    if not pairs:
+        return ""
+
+    def find_least(first: int, second: int) -> float:
+        return len(pairs) * compute_rank_sum(range(first), range(first, first + second))
+
+    least = min(find_least(*pair) for pair in pairs)
+    if least < SIGNIFICANT:
+        return ""
+    enough = next(number for number in count(2) if find_least(number, number) < SIGNIFICANT)
+    return (
+        f"with these numbers of runs and {len(pairs)} pair{'s' * (len(pairs) > 1)} of solvers, no difference can be significant: "
+        f"the least possible p-value is {min(least, 1.0):.2g}; {enough} runs of each solver allow one"
+    )

@@ -233,7 +233,7 @@ def describe_summaries(records: Sequence[RunRecord]) -> Iterator[str | Rows]:
         failures = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in find_failures(comparison.records)]
         if failures:
             yield Rows("Failed runs", ("solver", "failed", "reason of the first"), failures)
-        for sentence in describe_unknown(comparison):
+        for sentence in [*describe_unknown(comparison), *([comparison.power] if comparison.power else [])]:
             yield f"{comparison.problem}, {sentence}"
 
 

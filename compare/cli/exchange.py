@@ -47,7 +47,7 @@ def import_results(
     return Output(
         data={"problems": summarise_problems(shown)},
         parts=list(describe_summaries(shown)),
-        written=[*kept, *report],
+        written=[*report, *kept],
         failures=list_excluded(evidence.sentences),
     )
 

@@ -21,6 +21,7 @@ from nlp_gait.files import replace_nan
 
 T = TypeVar("T")
 
+MOST_NAMED = 3  # written files; of more, the first one is named
 LONGEST_CELL = 24  # characters of a word in a table that are not wrapped
 LONGEST_SENTENCE = 2000  # characters of an error message, in which a value can be a whole file
 LOG_PERIOD_S = 30.0  # between lines of progress in a log
@@ -94,9 +95,10 @@ def describe_command() -> str:
 
 
 def print_output(output: Output, as_json: bool) -> None:
-    """Print results and written files: as one JSON object, or as sentences, tables and a line per file."""
+    """Print results and written files: as one JSON object, or as sentences, tables and names of files."""
+    written = [*output.written]
     if as_json:  # numbers that are not finite are null, as not every reader accepts NaN
-        data = replace_nan({**output.data, "files": [str(path) for path in output.written]})
+        data = replace_nan({**output.data, "files": [str(path) for path in written]})
         sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
         return
     for block in output.parts:
@@ -104,8 +106,10 @@ def print_output(output: Output, as_json: bool) -> None:
             stdout.print(block)
         else:
             print_table(*block)
-    for path in output.written:
-        stdout.print(f"wrote {path}", soft_wrap=True)
+    if written:
+        others = f" and {len(written) - 1} files" if len(written) > MOST_NAMED else ""
+        for path in written[:1] if others else written:
+            stdout.print(f"wrote {path}{others}", soft_wrap=True)
     for sentence in output.answer:
         stdout.print(sentence, soft_wrap=True)
 

@@ -23,7 +23,8 @@ from nlp_gait.errors import InputError
 
 WEIGHTS = "Evaluations counted for a first derivative and a Hessian (default: n + 1, (n + 1)(n + 2)/2)."
 CSV = "Write all runs and all judged points as CSV files too."
-LATEX = "Also write a table of each problem for papers (LaTeX, package booktabs)."
+LATEX = "Also write tables for papers: of each problem, and of all problems and solvers (LaTeX, package booktabs)."
+DIGITS = "Decimals of objectives in these tables (default: as many as different medians need to differ)."
 FIGURES = "Also write all figures as PNG, and for papers as PDF, one column wide, with captions in LaTeX."
 LOGS = "Also write the runs as logs for iohinspector, into the folder logs."
 WATCH = "Rewrite the report while the study runs; the open page reloads itself."
@@ -38,6 +39,7 @@ def report(
     folder: Annotated[Path, Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
     weights: Annotated[str | None, Option(metavar="GRADIENT,HESSIAN", help=WEIGHTS)] = None,
     latex: Annotated[bool, Option("--latex", help=LATEX)] = False,
+    digits: Annotated[int | None, Option(min=0, max=15, help=DIGITS)] = None,
     figures: Annotated[bool, Option("--figures", help=FIGURES)] = False,
     logs: Annotated[bool, Option("--logs", help=LOGS)] = False,
     code: Code = None,
@@ -61,7 +63,7 @@ def report(
         watch_report(folder, lambda: rebuild_report(folder, weighting))
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = evidence.records
-    further = FurtherFiles(csv=csv, latex=latex, figures=figures)
+    further = FurtherFiles(csv=csv, latex=latex or digits is not None, decimals=digits, figures=figures)
     written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
     if logs:
         comparisons = compare_problems(records)

@@ -66,9 +66,14 @@ def plot_charts(charts: Sequence[Chart], columns: int = 2, *, column: bool = Fal
 
 def add_legends(figure: Figure, axes: Sequence[Axes], charts: Sequence[Chart]) -> None:
     """Add a legend below the figure for the first chart with the most solvers, if there are several without named rows."""
-    solvers = [0 if chart.rows else len({series.name for series in chart.series}) for chart in charts]
+    solvers = [count_named(chart) for chart in charts]
     if max(solvers, default=0) > 1:
         add_legend_below(figure, axes[solvers.index(max(solvers))])
+
+
+def count_named(chart: Chart) -> int:
+    """Return how many solvers a legend of the chart has; none if its rows have names."""
+    return 0 if chart.rows else len({series.name for series in chart.series})
 
 
 def assign_chart_looks(chart: Chart) -> dict[str, Look]:

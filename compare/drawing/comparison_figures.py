@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 SMALLEST_GAP = FEASIBILITY_TOLERANCE
 GRID_POINTS = 120
 AXES = {"evaluations": "equivalent evaluations", "seconds": "seconds of the solve"}
-GAP = "gap to the best known [%]"
+GAP = "gap to best known [%]"
 SHARES = (0.0, 1.02)  # range of an axis
 
 

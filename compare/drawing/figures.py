@@ -49,10 +49,13 @@ class Look:
 
 
 def assign_looks(names: Collection[str]) -> dict[str, Look]:
-    """Assign a look to each solver: known solvers have fixed colours; solvers with the same colour get different lines."""
+    """Assign a look to each solver: known solvers have fixed colours; solvers with the same colour get different lines.
+
+    Within ``share_looks`` a solver looks the same in all figures.
+    """
     used: Counter[str] = Counter()
     found: dict[str, Look] = {}
-    for name in sorted(names, key=lambda name: name not in COLOURS):
+    for name in sorted({*names, *_STUDIED.get()}, key=lambda name: (name not in COLOURS, name)):
         # A polished search has its search's colour; an unknown solver gets the least used one.
         known = COLOURS.get(name) or COLOURS.get(name.split("+")[0])
         colour = known or min((c for c in COLOURS.values() if c != INK), key=lambda c: used[c])
@@ -63,6 +66,17 @@ def assign_looks(names: Collection[str]) -> dict[str, Look]:
 
 
 _PRINTED: ContextVar[bool] = ContextVar("figures for a printed column", default=False)
+_STUDIED: ContextVar[frozenset[str]] = ContextVar("names of all solvers of the study", default=frozenset())
+
+
+@contextmanager
+def share_looks(names: Collection[str]) -> Iterator[None]:
+    """Within the context, assign looks as if every figure showed all of these solvers."""
+    token = _STUDIED.set(frozenset(names))
+    try:
+        yield
+    finally:
+        _STUDIED.reset(token)
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import numpy as np
 from compare.drawing.animation import COLOURS, GROUND, MARGIN
 from compare.drawing.charts import Chart, Series, add_legends, draw_chart
 from compare.drawing.figures import INK, Look, assign_looks, make_figure, use_style
+from compare.drawing.svg import draw_poses
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result, sample_signals
 from nlp_gait.formulation.display import TRUNK, Skeleton
@@ -97,6 +98,17 @@ def plot_gaits(gaits: Mapping[str, GaitCurves], *, curves: bool = True) -> Figur
             empty.set_axis_off()
         add_legends(figure, axes[count - len(charts) : count], charts)
     return figure
+
+
+def draw_first_poses(gaits: Mapping[str, GaitCurves]) -> str:
+    """Return the first gait from the side with the second one laid over it as SVG; InputError if there is nothing to draw."""
+    (name, first), *others = gaits.items()
+    if first.skeleton is None:
+        raise InputError("this gait has no skeleton to draw")
+    over = None
+    if others and others[0][1].skeleton is not None:
+        over = (others[0][0], others[0][1].skeleton, assign_looks(list(gaits))[others[0][0]])
+    return draw_poses(name, first.skeleton, over, POSES)
 
 
 def make_gait_charts(gaits: Mapping[str, GaitCurves]) -> list[Chart]:

@@ -60,6 +60,7 @@ class Figure:
     name: str
     caption: str
     drawing: Drawing | Callable[[], Drawing]  #: or the function that draws it
+    svg: Callable[[], str] | None = None  #: writes it without Matplotlib; None if only Matplotlib can
     #: From which the page draws an interactive figure, if its scripts have an entry for ``kind``; else the drawing stays
     data: Mapping[str, Any] | None = None
 

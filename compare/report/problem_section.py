@@ -7,7 +7,8 @@ from compare.analysis.columns import MAIN, Column, format_rows
 from compare.analysis.comparison import Comparison
 from compare.drawing.charts import Chart, encode_charts, plot_charts
 from compare.drawing.comparison_figures import make_convergence_charts, make_ecdf_charts, make_final_gap_charts
-from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
+from compare.drawing.gait_figure import GaitCurves, draw_first_poses, plot_gaits, prepare_gait
+from compare.drawing.svg import draw_charts
 from compare.report.document import Figure, Part, Section, Table, make_text_table
 from compare.report.interactive import describe_gaits
 from compare.study.record import load_gait
@@ -16,7 +17,7 @@ from nlp_gait.files import make_file_name
 
 # Figures of a problem by name: the function from its comparison to charts, and the caption.
 FIGURES = {
-    "final": (make_final_gap_charts, "Every run; bar: median; dotted: tolerance."),
+    "final": (make_final_gap_charts, "Bar: median; dotted: tolerance."),
     "convergence": (
         make_convergence_charts,
         "Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end. Gaps below the "
@@ -38,8 +39,9 @@ def make_problem_section(comparison: Comparison, gaits: Mapping[str, GaitCurves]
         parts.append(
             Figure(
                 name=f"{make_file_name(comparison.problem)}-gaits",
-                caption="Best gait, another dashed over it.",
+                caption="Best gait.",
                 drawing=partial(plot_gaits, gaits, curves=False),
+                svg=partial(draw_first_poses, gaits),
                 data=describe_gaits(gaits, curves=False),
             )
         )
@@ -56,7 +58,13 @@ def make_figure(comparison: Comparison, name: str) -> Figure:
 
 def make_chart_figure(name: str, caption: str, charts: Sequence[Chart], columns: int = 2) -> Figure:
     """Return the figure of charts, which the page draws itself."""
-    return Figure(name=name, caption=caption, drawing=partial(plot_charts, charts, columns), data=encode_charts(charts))
+    return Figure(
+        name=name,
+        caption=caption,
+        drawing=partial(plot_charts, charts, columns),
+        data=encode_charts(charts),
+        svg=partial(draw_charts, charts, columns),
+    )
 
 
 def make_statistics_table(comparison: Comparison, columns: tuple[Column, ...], caption: str = "") -> Table:

@@ -7,6 +7,7 @@ from pathlib import Path
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
 from compare.analysis.headline import MANY, write_headlines
 from compare.analysis.record_statistics import Weighting
+from compare.drawing.figures import share_looks
 from compare.judge import evaluate
 from compare.report.document import Document, Section, make_table_section
 from compare.report.problem_section import load_gaits, make_problem_section
@@ -54,9 +55,10 @@ def write_report(
 ) -> list[Path]:
     """Write the report with stored simulations, its figures as SVG, and further files; return all paths."""
     comparisons = compare_problems(records, weighting)
-    document = make_study_document(comparisons, manifest, excluded)
-    written = write_document(folder, document)
-    return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons, document)]
+    with share_looks({record.solver for record in records}):
+        document = make_study_document(comparisons, manifest, excluded)
+        written = write_document(folder, document)
+        return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons, document)]
 
 
 def watch_report(folder: Path, rewrite: Callable[[], object], sleep: Callable[[float], None] = time.sleep) -> None:

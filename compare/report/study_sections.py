@@ -70,10 +70,11 @@ def _list_failures(comparison: Comparison) -> tuple[Section, ...]:
     return make_table_section("Runs that ended infeasible or failed", header, rows, prose=True)
 
 
-def list_tests(comparison: Comparison) -> tuple[Table, ...]:
-    """Return the tests of all pairs of solvers."""
+def list_tests(comparison: Comparison) -> tuple[Part, ...]:
+    """Return the tests of all pairs of solvers, and whether they can show anything."""
     rows = [(f"{p.first} < {p.second}", _format_p(p.rank_sum), f"{p.a12:.3f}") for p in comparison.pairs]
-    return (make_text_table(("better median < other", "rank-sum p", "A12"), rows),) if rows else ()
+    power = (f"{comparison.power[:1].upper()}{comparison.power[1:]}.",) if comparison.power else ()
+    return (*power, make_text_table(("better median < other", "rank-sum p", "A12"), rows)) if rows else ()
 
 
 TESTS = (

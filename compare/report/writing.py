@@ -37,7 +37,7 @@ def write_parts(folder: Path, parts: Sequence[Part]) -> list[Path]:
     files: list[Path] = []
     for part in iterate_leaves(parts):
         if isinstance(part, Figure):
-            files.append(write_text(folder / f"{part.name}.svg", render_svg(part.draw())))
+            files.append(write_text(folder / f"{part.name}.svg", part.svg() if part.svg else render_svg(part.draw())))
         elif isinstance(part, Table) and part.name:
             files.append(write_text(folder / f"{part.name}.csv", format_csv(part.csv_rows)))
     return files

@@ -85,6 +85,7 @@ def import_runs(
             end = verdict.objective if verdict.feasible else None
             history = History(evaluations=(table.count("evaluations", k, count, 1),), objective=(end,))
             seconds = (row["time_s"],)
+        solve = (time for time in (row["time_s"], *seconds[-1:]) if not math.isnan(time))
         claim = None if math.isnan(row["objective"]) else row["objective"]
         seed = run if math.isnan(row["seed"]) else table.count("seed", k, row["seed"])
         content = [x.tolist(), {name: repr(value) for name, value in row.items()}, asdict(history), repr(seconds)]
@@ -113,7 +114,7 @@ def import_runs(
                 iterations=0,
                 active_constraints=(),
                 history=history,
-                time_s=Times.make_unknown(seconds[-1] if seconds else row["time_s"], seconds),
+                time_s=Times.make_unknown(next(solve, math.nan), seconds),
             )
         )
     return records

@@ -52,7 +52,7 @@ def find_record(folder: Path, task: Task) -> RunRecord | None:
 
 
 def read_records(folder: Path) -> list[RunRecord]:
-    """Return the records of a study by file name; raises InputError if there are none, or one is damaged."""
+    """Return the records of a study in the order of ``read_each``; raises InputError if there are none, or one is damaged."""
     records = []
     for _, record in read_each(folder):
         if isinstance(record, InputError):
@@ -62,13 +62,14 @@ def read_records(folder: Path) -> list[RunRecord]:
 
 
 def read_each(folder: Path) -> list[tuple[Path, RunRecord | InputError]]:
-    """Return files and records in the order of ``read_records``, damaged ones as their error; InputError if there are none.
+    """Return files and records, damaged ones as their error; InputError if there are none.
 
-    Those that ``study.json`` lists are read; all, if it lists none.
+    Those that ``study.json`` lists are read, in its order; all by their names, if it lists none.
     """
-    listed = {folder / RECORDS / f"{name}.json" for name in read_manifest(folder).runs}
+    listed = {folder / RECORDS / f"{name}.json": place for place, name in enumerate(read_manifest(folder).runs)}
     with convert_errors(f"folder {str(folder)!r} cannot be read", InputError):
         paths = [path for path in sorted((folder / RECORDS).glob("*/*.json")) if path in listed or not listed]
+        paths.sort(key=lambda path: listed.get(path, 0))
     if not paths:
         raise InputError(f"{str(folder)!r} contains no records ({RECORDS}/<problem>/<solver>-<run>-<key>.json)")
     return [(path, _read_or_error(path)) for path in paths]

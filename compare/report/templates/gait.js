@@ -61,8 +61,8 @@ class GaitView {
   addControls(bar) {
     this.button = element("button", { type: "button", class: "play" }, bar);
     this.button.addEventListener("click", () => this.play(!this.playing));
-    const label = element("label", { class: "scrub" }, bar, "time ");
-    this.slider = element("input", { type: "range", min: "0", max: "1000", value: "0" }, label);
+    const label = element("div", { class: "scrub" }, bar);
+    this.slider = element("input", { type: "range", "aria-label": "time", min: "0", max: "1000", value: "0" }, label);
     this.slider.addEventListener("input", () => { this.play(false); this.time = (this.slider.value / 1000) * this.duration; this.draw(); });
     this.clock = element("output", {}, bar);
     const select = (words, options, chosen, act) => {
@@ -75,7 +75,7 @@ class GaitView {
     const names = this.gaits.map((gait, i) => [i, gait.name]);
     const again = () => this.select();
     this.first = this.charts ? select("gait", names, "0", again) : { value: "0" };
-    this.second = select("over it", [["", "none"], ...names], names.length > 1 ? "1" : "", again);
+    this.second = select("over", [["", "none"], ...names], names.length > 1 ? "1" : "", again);
     if (this.charts) select("speed", [[1, "1"], [0.5, "1/2"], [0.25, "1/4"], [0.1, "1/10"]], "0.25", (value) => { this.speed = Number(value); });
     this.play(this.playing);
   }

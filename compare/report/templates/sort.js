@@ -1,6 +1,5 @@
 "use strict";
-// A click on a column's head sorts the table by it, a second click the other way round. On narrow screens, where the style sets
-// each row as a block, every cell says of which column it is.
+// A click on a column's head sorts the table by it, a second click the other way round.
 for (const table of document.querySelectorAll("table")) {
   const heads = [...table.tHead.rows[0].cells];
   const body = table.tBodies[0];
@@ -13,7 +12,6 @@ for (const table of document.querySelectorAll("table")) {
     return String(a).localeCompare(String(b), "en", { numeric: true });
   };
   table.classList.add("sortable");
-  for (const row of body.rows) [...row.cells].forEach((cell, column) => { cell.dataset.label = heads[column].textContent; });
   heads.forEach((head, column) => {
     head.title ||= `Sort by ${head.textContent}`;
     head.addEventListener("click", () => {

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import mannwhitneyu
 
 from compare.analysis.best_known import compute_gap
+from compare.analysis.pairs import describe_power
 from compare.analysis.record_statistics import (
     ECDF_TARGETS,
     TARGETS,
@@ -272,3 +274,19 @@ def test_bootstrap_interval_is_a_quantile_of_the_resamples() -> None:
     assert bootstrap_interval([[1, 2, 3]], count, level=1.0) == (0.0, 1999.0)
     sample = list(range(30))
     assert bootstrap_interval([sample], np.mean) == bootstrap_interval([sample], np.mean)
+
+
+@given(costs, costs)
+def test_the_rank_sum_test_is_that_of_scipy(a: list[float], b: list[float]) -> None:
+    expected = 1.0 if len({*a, *b}) == 1 else float(mannwhitneyu(a, b, alternative="two-sided").pvalue)
+    assert compute_rank_sum(a, b) == pytest.approx(expected, rel=1e-12)
+
+
+def test_too_few_runs_for_any_difference_are_named() -> None:
+    # Two samples of 3 have 20 orders: two of them are the most extreme, p = 0.1; of 4, 2 in 70.
+    assert "least possible p-value is 0.1; 4 runs of each solver allow one" in describe_power([3, 3])
+    assert describe_power([4, 4]) == describe_power([1, 1]) == ""
+    # Five solvers of 5 runs: 10 pairs of p = 2 / 252.
+    assert "10 pairs of solvers" in describe_power([5] * 5) and "least possible p-value is 0.079" in describe_power(
+        [5] * 5
+    )

@@ -13,7 +13,7 @@ import pytest
 from compare.analysis.comparison import compare_problems
 from compare.report import FurtherFiles
 from compare.report.document import Document
-from compare.report.study_files import format_latex_table
+from compare.report.latex import format_latex_table
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task

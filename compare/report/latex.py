@@ -1,0 +1,160 @@
+"""Tables of a study for papers, in LaTeX with the package booktabs: one of each problem, and one of problems and solvers."""
+
+import math
+from collections.abc import Sequence
+from statistics import mean, median, stdev
+
+from compare.analysis.comparison import Comparison, index_solvers
+from compare.analysis.overview import count_wins, list_user_solvers, rank_over_problems
+from compare.analysis.pairs import SIGNIFICANT
+from compare.analysis.units import join_words, make_heading, with_unit
+from nlp_gait.files import make_file_name
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+
+HEADER = ("solver", "feasible", "best", "median", "mean", "std.", "worst", "gap", "$p$")
+SPECIAL = str.maketrans(
+    {c: rf"\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}", "\\": r"\textbackslash{}"}
+)
+UNKNOWN = "--"
+LEAST_DECIMALS, MOST_DECIMALS = 4, 10
+LEAST_GAP = 1e-8  # smaller ones are rounding
+
+
+def format_latex_table(comparison: Comparison, decimals: int | None = None) -> str:
+    """Return the table of one problem: a row for each solver, the best median over all runs first.
+
+    Objectives have so many decimals, or else as many as different medians need to differ.
+    """
+    decimals = _choose_decimals(comparison) if decimals is None else decimals
+    p_values = {pair.second: pair.rank_sum for pair in comparison.pairs if pair.first == comparison.solvers[0].name}
+    rows = []
+    for solver in comparison.solvers:
+        values = sorted((comparison.value(cost) for cost in solver.feasible), reverse=comparison.objective.sign < 0)
+        deviation = stdev(values) if len(values) > 1 else None
+        numbers = (values[0], median(values), mean(values), deviation, values[-1]) if values else 5 * (None,)
+        cells = [_format_number(number, decimals) for number in numbers]
+        if solver.name in comparison.leaders and values:
+            cells[1] = rf"\textbf{{{cells[1]}}}"
+        p = p_values.get(solver.name)
+        shown_p = UNKNOWN if p is None else "$<$0.001" if p < 0.001 else f"{p:.3f}"
+        gap = _format_gap(comparison.gap(solver.median_cost))
+        rows.append((escape_latex(solver.name), f"{len(values)}/{len(solver.records)}", *cells, gap, shown_p))
+    return _format_table(_write_caption(comparison), make_file_name(comparison.problem), HEADER, rows)
+
+
+def format_latex_overview(comparisons: Sequence[Comparison]) -> str:
+    """Return the table of problems and solvers: median gaps, marked by the test against the first of the user's solvers.
+
+    Without one, the solver with the best mean rank takes its place. The last rows count the marks and give mean ranks.
+    """
+    ranks = rank_over_problems(comparisons).mean_ranks
+    by_name, _ = index_solvers(comparisons)
+    names = list(dict.fromkeys([*ranks, *(name for solvers in by_name for name in solvers)]))
+    subject = [*list_user_solvers(comparisons), *names][0]
+    rows = []
+    for comparison, solvers in zip(comparisons, by_name, strict=True):
+        marks = {
+            pair.second if pair.first == subject else pair.first: _mark(pair.first == subject, pair.is_significant)
+            for pair in comparison.pairs
+            if subject in (pair.first, pair.second)
+        }
+        cells = [
+            f"{_format_gap(comparison.gap(solvers[name].median_cost))} {marks.get(name, '')}".strip()
+            if name in solvers
+            else UNKNOWN
+            for name in names
+        ]
+        rows.append((escape_latex(comparison.problem), *cells))
+    scores = {score.other: f"{score.wins}/{score.losses}/{score.ties}" for score in count_wins(comparisons, subject)}
+    rows.append((r"\midrule $+$/$-$/$=$", *(scores.get(name, UNKNOWN) for name in names)))
+    rows.append(("mean rank", *(f"{ranks[name]:.2f}" if name in ranks else UNKNOWN for name in names)))
+    caption = (
+        f"Median gap to the best known value. {subject} is significantly better ($+$), worse ($-$) or not different ($=$): "
+        f"two-sided rank-sum test at {SIGNIFICANT:g}, Holm-corrected over all pairs on the problem. "
+        "Ranks are those of the medians, of solvers that ran on all problems."
+    )
+    text = escape_latex(caption).replace(r"\$", "$")
+    return _format_table(text, "problems", ("problem", *map(escape_latex, names)), rows)
+
+
+def _mark(is_better: bool, is_significant: bool) -> str:
+    return ("$+$" if is_better else "$-$") if is_significant else "$=$"
+
+
+def _format_table(caption: str, label: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    head, *lines = [" & ".join(row) + r" \\" for row in (header, *rows)]
+    return "\n".join(
+        [
+            r"\begin{table}",
+            r"\centering\small\setlength{\tabcolsep}{4pt}",
+            rf"\caption{{{caption}}}",
+            rf"\label{{tab:{label}}}",
+            rf"\begin{{tabular}}{{l{'r' * (len(header) - 1)}}}",
+            r"\toprule",
+            head,
+            r"\midrule",
+            *lines,
+            r"\bottomrule",
+            r"\end{tabular}",
+            r"\end{table}",
+            "",
+        ]
+    )
+
+
+def _choose_decimals(comparison: Comparison) -> int:
+    """Return the least number of decimals by which medians that differ beyond the judge's tolerance differ in print."""
+    medians = sorted(solver.median_cost for solver in comparison.solvers if math.isfinite(solver.median_cost))
+    steps = [b - a for a, b in zip(medians, medians[1:], strict=False)]
+    least = min((s for s in steps if s > FEASIBILITY_TOLERANCE * abs(medians[0])), default=1.0)
+    return min(max(math.ceil(-math.log10(least)), LEAST_DECIMALS), MOST_DECIMALS)
+
+
+def escape_latex(text: str) -> str:
+    """Return a text with LaTeX's special characters escaped."""
+    return text.translate(SPECIAL)
+
+
+def describe_run_counts(comparison: Comparison) -> str:
+    """Return for example "n = 20 runs of each solver, at most 10,000 evaluations of a search"."""
+    runs = sorted({len(solver.records) for solver in comparison.solvers})
+    stops = [record.inputs.stop for record in comparison.records]
+    budgets = sorted({stop["evaluations"] for stop in stops if "evaluations" in stop})
+    count = " to ".join(map(str, dict.fromkeys((runs[0], runs[-1]))))
+    budget = f", at most {join_words(f'{each:,}' for each in budgets)} evaluations of a search" if budgets else ""
+    return f"n = {count} runs of each solver{budget}"
+
+
+def _write_caption(comparison: Comparison) -> str:
+    objective = comparison.objective
+    gap = "No feasible point is known"
+    if math.isfinite(comparison.reference):
+        best_known = with_unit(comparison.reference, objective.unit)
+        gap = f"Gap: distance of the median from the best known value, {best_known} ({comparison.known.source})"
+    sentences = [
+        f"{make_heading(objective.name, objective.unit)} on {comparison.problem}, to be {objective.sense}d: "
+        f"{describe_run_counts(comparison)}",
+        "Best to worst are over the feasible runs",
+        gap,
+        "p: two-sided rank-sum test over all runs against the first solver, Holm-corrected over all pairs",
+        f"Bold: the first solver and those that do not differ from it at {SIGNIFICANT:g}",
+    ]
+    return ". ".join(map(escape_latex, sentences)) + "."
+
+
+def _format_gap(gap: float) -> str:
+    """Return a gap as a power of ten with two digits."""
+    if not math.isfinite(gap):
+        return "infeasible"
+    if gap < LEAST_GAP:
+        return "$<10^{-8}$" if gap > 0.0 else "0"
+    digits, exponent = f"{gap:.1e}".split("e")
+    return rf"${digits}\cdot 10^{{{int(exponent)}}}$"
+
+
+def _format_number(value: float | None, decimals: int) -> str:
+    """Format a number with a true minus sign."""
+    if value is None:
+        return UNKNOWN
+    text = f"{value:.{decimals}f}" if abs(value) < 1e6 else f"{value:.4e}"
+    return text.replace("-", "$-$", 1) if text.startswith("-") else text

@@ -1,0 +1,51 @@
+"""Charts as SVG: well-formed, within the picture, every point drawn, and one look per solver over a study."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from compare.drawing.charts import Chart, Series
+from compare.drawing.figures import assign_looks, share_looks
+from compare.drawing.svg import draw_charts
+
+NS = "{http://www.w3.org/2000/svg}"
+X = np.array([1.0, 10.0, 1000.0, np.inf])
+
+
+@pytest.mark.parametrize("shape", ["line", "step", "points"])
+@pytest.mark.parametrize("log", [(True, True), (True, False), (False, False)])
+def test_every_known_point_is_drawn_inside_the_picture(shape: str, log: tuple[bool, bool]) -> None:
+    series = [Series(name=name, x=X, y=np.array([1e-4, 0.1, 2.0, 3.0]), shape=shape) for name in ("a <b>", "c")]  # type: ignore[arg-type]
+    root = ElementTree.fromstring(draw_charts([Chart(x="cost", y="gap & more", series=series, log=log)]))
+    _, _, width, height = map(float, root.attrib["viewBox"].split())
+    texts = [text.text for text in root.iter(f"{NS}text")]
+    assert {"a <b>", "c", "cost", "gap & more"} <= set(texts)  # escaped, with a legend
+    paths = [
+        path.attrib["d"] for path in root.iter(f"{NS}path") if "opacity" in path.attrib or "stroke-width" in path.attrib
+    ]
+    drawn = [d for d in paths if not d.endswith("h28")]
+    assert len(drawn) == 2
+    for path in drawn:
+        points = [(float(a), float(b)) for a, b in re.findall(r"[ML]([\d.]+) ([\d.]+)", path)]
+        assert len(points) == (5 if shape == "step" else 3)
+        assert all(0.0 < x <= width and 0.0 <= y < height for x, y in points)
+        assert points[0][0] < points[-1][0] and points[0][1] > points[-1][1]  # up is up
+
+
+def test_a_chart_without_any_point_has_axes_alone() -> None:
+    empty = np.array([])
+    ElementTree.fromstring(
+        draw_charts([Chart(x="x", y="y", series=[Series(name="a", x=empty, y=empty)], log=(True, True))])
+    )
+
+
+def test_a_solver_has_one_look_in_all_figures_of_a_study() -> None:
+    alone = assign_looks(["mine", "yours"])["yours"]
+    with share_looks(["a", "ipopt", "mine", "other", "yours"]):
+        looks = [assign_looks(names)["yours"] for names in (["yours"], ["yours", "mine"], ["ipopt", "a", "yours"])]
+    assert looks[0] == looks[1] == looks[2] != alone
+    assert assign_looks(["mine", "yours"])["yours"] == alone

@@ -1,0 +1,44 @@
+"""A study in one call."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import nlp_gait
+from compare.report.compared_study import ComparedStudy
+from metaheuristics import ParticleSwarm
+from nlp_gait.errors import InputError, UnknownNameError
+
+
+@pytest.fixture(scope="module")
+def study() -> ComparedStudy:
+    solvers = {"pso": "pso", "small swarm": ParticleSwarm(population=10)}
+    return nlp_gait.compare(["nao-dsp", "nao-ssp"], solvers, runs=3, starts=1, evaluations=300)
+
+
+def test_one_call_compares_searches_with_ipopt(study: ComparedStudy, tmp_path: Path) -> None:
+    assert [len(comparison.solvers) for comparison in study.comparisons] == [3, 3]
+    assert str(study).startswith("On nao-dsp the best power is 0.531886 W, proven optimal")
+    assert study.table("nao-ssp").splitlines()[1].split()[:2] == ["ipopt", "1/1"]
+    assert study.plot().axes and "small swarm" in study._repr_html_()
+    frame = study.to_frame()
+    assert len(frame) == 14 and set(frame.solver) == {"ipopt", "pso", "small swarm"}
+    assert "<html" in study.report(tmp_path).read_text()
+    with pytest.raises(UnknownNameError, match="nao-dps"):
+        study.table("nao-dps")
+
+
+def test_tables_for_papers_show_different_digits_gaps_and_marks(study: ComparedStudy) -> None:
+    text = study.latex()
+    assert text.count(r"\begin{tabular}") == 3 and r"\cdot 10^{-1}" in text
+    overview = text[text.rindex(r"\begin{table}") :]
+    assert "& small swarm" in overview and r"$+$/$-$/$=$" in overview and "mean rank & 1.00" in overview
+    rows = [line.split(" & ") for line in study.latex(decimals=7).splitlines() if line.startswith("ipopt")]
+    assert rows[0][3].startswith("0.53188") and len(rows[0][2]) == 9
+
+
+def test_what_cannot_run_is_refused() -> None:
+    with pytest.raises(InputError, match="runs must be at least 1"):
+        nlp_gait.compare("nao-dsp", runs=0)
