@@ -29,7 +29,10 @@ DRIVE = (
     "40 ms, nothing fed forward. Or a file with settings of drive and feedback."
 )
 TORQUES = "urdf, stall or continuous: published limits differ; joints without motor data have the file's."
-FEEDBACK = "none, in open loop; torso-spring: balance by measured place and attitude of the torso."
+FEEDBACK = (
+    "none, in open loop; balance: footholds, times of steps and torques of the whole body by the measured state (extra sim); "
+    "torso-spring: balance by measured place and attitude of the torso."
+)
 SLOPE = "Rise of the floor forward and to the left, added to the slope of a walk planned for one."
 PUSH = "Impulse on the torso, forward and to the left [N s], and its begin [s] (default: in the middle)."
 
@@ -53,7 +56,7 @@ class DriveOptions:
             return drive
         if self.feedback not in FEEDBACKS:
             raise unknown("feedback", self.feedback, FEEDBACKS)
-        return replace(drive, feedback=FEEDBACKS[self.feedback])
+        return replace(drive, **FEEDBACKS[self.feedback])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,7 +165,10 @@ def simulate(
         write_text(folder / "model.xml", make_plan_model(plan, drive, sole, conditions.friction))
         write_npz(folder / "simulation.npz", trace.signals(plan.joints))
         written += plot_simulation(plan, trace, drive, folder / "simulation")
-    parts = [*_describe(report), *(() if walk is None else [_describe_course(walk, drive.feedback is None)])]
+    parts = [
+        *_describe(report),
+        *(() if walk is None else [_describe_course(walk, drive.feedback is None and drive.balance is None)]),
+    ]
     if climb is not None:
         parts.append(_describe_climb(climb))
     interrupted = ""
@@ -237,7 +243,7 @@ def _describe_survival(survival: Robustness) -> Iterator[str]:
 
 def _describe_course(walk: Walk, open_loop: bool) -> str:
     if walk.walked_m is None or walk.drift_m is None or walk.heading_deg is None:
-        remedy = "; --feedback torso-spring, larger margins or a lower speed may keep it up" if open_loop else ""
+        remedy = "; --feedback balance, larger margins or a lower speed may keep it up" if open_loop else ""
         return f"{walk.steps_done} of {walk.steps} steps completed before the fall{remedy}"
     walked, planned, drift = (format_millimetres(m, ".0f") for m in (walk.walked_m, walk.planned_m, walk.drift_m))
     return (

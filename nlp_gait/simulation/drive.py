@@ -2,10 +2,10 @@
 
 import math
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from nlp_gait.files import read_text
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Joint
 from nlp_gait.simulation.engine import check_period
+from nlp_gait.simulation.balance import Balance, WholeBodyBalance
 from nlp_gait.simulation.feedback import BalanceController, Feedback
 from nlp_gait.simulation.joint_controller import GravityCompensation, JointController
 from nlp_gait.simulation.plan import Plan
@@ -26,6 +27,16 @@ UNLIMITED_NM = 1e6
 ROUNDING = 1e-9  # in periods: a set-point is valid from its own time
 INTERPOLATIONS = ("linear", "held")  # between two set-points
 FEED_FORWARD = ("torque", "velocity", "none")  # torque includes velocity
+
+
+class Corrector(Protocol):
+    """Corrects the set-points of one simulation."""
+
+    def find_plan_time(self, time_s: float) -> float:
+        """Return the time of the plan that the robot follows at a time of the simulation [s]."""
+
+    def correct(self, command: Array, data: Any) -> Array:
+        """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +55,8 @@ class Drive:
     interpolation: str = "linear"
     feed_forward: str = "torque"  #: ``torque`` (and velocity), ``velocity``, or ``none``
     torque_limits: str = "urdf"  #: source of the limits
-    feedback: Feedback | None = None  #: corrects the set-points; None for open loop
+    feedback: Feedback | None = None  #: a spring at the torso corrects the set-points; None for open loop
+    balance: Balance | None = None  #: whole-body balance commands torques by the set-points
     controller: JointController | None = None  #: gains instead of the motors' stiffness, on desired angles and rates
 
     def __post_init__(self) -> None:
@@ -58,12 +70,16 @@ class Drive:
             if getattr(self, name) not in names:
                 words = name.replace("_", " ")
                 raise InputError(f"{words} of a drive must be one of {', '.join(names)}, got {getattr(self, name)!r}")
-        if self.controller is not None and self.feedback is not None:
-            raise InputError("a drive has a controller or a feedback, not both; leave one out")
+        corrections = [name for name in ("controller", "feedback", "balance") if getattr(self, name) is not None]
+        if len(corrections) > 1:
+            raise InputError(f"a drive has one of controller, feedback and balance, got {' and '.join(corrections)}")
 
     def stiffness(self, joint: Joint) -> float:
         """Return the stiffness of a joint's drive [Nm/rad]."""
-        return find_stall_torque(joint) / self.full_error_rad if self.controller is None else self.controller.kp
+        if self.controller is not None:
+            return self.controller.kp
+        share = 1.0 if self.balance is None else self.balance.stiffness
+        return share * find_stall_torque(joint) / self.full_error_rad
 
     def damping(self, joint: Joint) -> float:
         """Return the damping of a joint's drive [Nm s/rad]."""
@@ -95,15 +111,17 @@ class Drive:
             return shifted
         return shifted + tau / np.array([self.stiffness(joint) for joint in joints])
 
-    def balance(self, plan: Plan, model: Any) -> BalanceController | GravityCompensation | None:
-        """Return what corrects the set-points of one simulation, if the drive has a feedback or compensates gravity."""
+    def make_corrector(self, plan: Plan, model: Any) -> Corrector | None:
+        """Return what corrects the set-points of one simulation, None in open loop; ``model`` is the nominal one."""
         if self.controller is not None and self.controller.gravity_compensation > 0.0:
             return GravityCompensation(self.controller, plan, model)
-        if self.feedback is None:
-            return None
         joints = [plan.robot.joint(name) for name in plan.joints]
-        stiffness = np.array([self.stiffness(joint) for joint in joints])
-        return BalanceController(self.feedback, plan, stiffness, model)
+        stiffness, damping, limits = (
+            np.array([find(joint) for joint in joints]) for find in (self.stiffness, self.damping, self.torque_limit)
+        )
+        if self.balance is not None:
+            return WholeBodyBalance(self.balance, plan, (stiffness, damping), limits, model)
+        return None if self.feedback is None else BalanceController(self.feedback, plan, stiffness, model)
 
     def torque_limit(self, joint: Joint) -> float:
         """Return the torque limit of a joint [Nm]; the paper's controller has none."""
@@ -124,8 +142,8 @@ def find_stall_torque(joint: Joint) -> float:
 def load_drive(name: str) -> Drive:
     """Return the drive of a name in ``DRIVES``, or of a TOML file.
 
-    The file has fields of ``Drive``, and those of ``Feedback`` in a table ``[feedback]`` or of ``JointController`` in
-    a table ``[controller]``.
+    The file has fields of ``Drive``, and those of ``Feedback`` in a table ``[feedback]``, of ``Balance`` in a table
+    ``[balance]``, or of ``JointController`` in a table ``[controller]``.
 
     Raises UnknownNameError, or InputError for a file or setting that is not allowed.
     """
@@ -142,4 +160,8 @@ def load_drive(name: str) -> Drive:
 
 # By name: as NAO's own controller, and set-points held for 40 ms, the sampling of the paper's gaits.
 DRIVES = {"feed-forward": Drive(), "held": Drive(period_s=0.04, interpolation="held", feed_forward="none")}
-FEEDBACKS = {"none": None, "torso-spring": Feedback()}
+FEEDBACKS: Mapping[str, Mapping[str, Feedback | Balance | None]] = {
+    "none": {"feedback": None, "balance": None},
+    "torso-spring": {"feedback": Feedback(), "balance": None},
+    "balance": {"feedback": None, "balance": Balance()},
+}

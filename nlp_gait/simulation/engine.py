@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import InputError, MissingExtraError, OutputError
+from nlp_gait.formulation import Array
 from nlp_gait.simulation.plan import SIDES, Plan
 
 DRIVER = "MUJOCO_GL"  # environment variable with MuJoCo's graphics driver, read when it is imported
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
+LEAST_LOAD = 1.0  # [N]; below this total load there is no centre of pressure
 
 
 def load_mujoco(*, pictures: bool = False) -> ModuleType:
@@ -51,6 +53,29 @@ class Addresses:
             for contacts in (plan.robot.feet, plan.robot.toes):
                 if side in contacts:
                     self.foot_of_geometry[model.geom_bodyid == model.body(contacts[side].link).id] = i
+
+
+def measure_loads(data: Any, addresses: Addresses) -> Array:
+    """Return the normal forces on both feet (2,), from all contacts with the ground [N]."""
+    feet, forces, _ = _list_contacts(data, addresses)
+    return np.array([forces[feet == i].sum() for i in range(len(SIDES))])
+
+
+def measure_pressure(data: Any, addresses: Addresses) -> tuple[Array, Array]:
+    """Return the normal forces on both feet (2,) [N] and the centre of pressure (2,) [m], from all contacts with the ground."""
+    _, forces, places = _list_contacts(data, addresses)
+    total = forces.sum()
+    centre = forces @ places / total if total > LEAST_LOAD else np.full(2, np.nan)
+    return measure_loads(data, addresses), centre
+
+
+def _list_contacts(data: Any, addresses: Addresses) -> tuple[Array, Array, Array]:
+    """Return the foot's number, the normal force [N] and the place (2,) [m] of each contact."""
+    contact = data.contact
+    active = contact.efc_address >= 0
+    forces = data.efc_force[contact.efc_address[active]]  # the first row of an elliptic contact is along its normal
+    feet = addresses.foot_of_geometry[contact.geom[active].max(axis=1)]  # the ground's geometries come first
+    return feet, forces, contact.pos[active, :2]
 
 
 # Between two commands of a controller: NAO's has cycles of 10 ms, the engine steps of 0.5 ms.

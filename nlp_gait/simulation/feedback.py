@@ -115,6 +115,10 @@ class BalanceController:
         weight, height = plan.robot.mass_kg * plan.gravity, plan.at("hip", np.zeros(1))[0, 2]
         self._most = feedback.growth_limit * weight * np.repeat([1.0, height], 3)
 
+    def find_plan_time(self, time_s: float) -> float:
+        """Return the time of the plan at a time of the simulation: the same [s]."""
+        return time_s
+
     def correct(self, command: Array, data: Any) -> Array:
         """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
         measured = self._sensor.read(data)

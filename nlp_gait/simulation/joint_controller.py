@@ -44,6 +44,10 @@ class GravityCompensation:
         rates = self._addresses.rates
         self._root = np.setdiff1d(np.arange(model.nv), rates)
 
+    def find_plan_time(self, time_s: float) -> float:
+        """Return the time of the plan at a time of the simulation: the same [s]."""
+        return time_s
+
     def correct(self, command: Array, data: Any) -> Array:
         """Return the set-points (J,) [rad] with those of gravity added."""
         return command + self._controller.gravity_compensation * self.hold(data) / self._controller.kp

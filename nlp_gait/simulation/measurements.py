@@ -92,17 +92,17 @@ class Measurements:
 
 def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
     """Compute the numbers of a simulation."""
-    during = simulation.t <= plan.duration_s
-    error = plan.at("q", simulation.t[during]) - simulation.q[during]
+    during = simulation.plan_t <= plan.duration_s
+    error = plan.at("q", simulation.plan_t[during]) - simulation.q[during]
     torque = simulation.torque[during]
     joints = [plan.robot.joint(name) for name in plan.joints]
     limits = np.array([drive.torque_limit(joint) for joint in joints])
     low, high = np.array([joint.limits_rad for joint in joints]).T
     outside = (simulation.q[during] < low) | (simulation.q[during] > high)
     pressure = average_pressure(simulation, drive.period_s)
-    deviation = np.linalg.norm(pressure - plan.at("zmp", simulation.t), axis=1)[during]
+    deviation = np.linalg.norm(pressure - plan.at("zmp", simulation.plan_t), axis=1)[during]
     touchdowns = _find_touchdowns(plan, simulation)
-    share = simulation.t[during] / plan.duration_s
+    share = simulation.plan_t[during] / plan.duration_s
     middle = deviation[(share >= MIDDLE[0]) & (share <= MIDDLE[1])]
     return Measurements(
         fallen=simulation.fell_at_s is not None,
@@ -155,7 +155,7 @@ def _measure_slip(plan: Plan, simulation: Simulation) -> float:
     moved = [feet[side] for side in plan.supports]
     if not moved:  # both feet swing: their supports begin and end
         for side, path in feet.items():
-            standing = np.concatenate([[0], plan.stands(side, simulation.t), [0]])
+            standing = np.concatenate([[0], plan.stands(side, simulation.plan_t), [0]])
             starts, ends = (np.flatnonzero(np.diff(standing) == change) for change in (1, -1))
             moved += [path[start:end] for start, end in zip(starts, ends, strict=True)]
     return max((float(np.linalg.norm(path - path[0], axis=1).max()) for path in moved), default=0.0)
@@ -164,7 +164,7 @@ def _measure_slip(plan: Plan, simulation: Simulation) -> float:
 def _find_touchdowns(plan: Plan, simulation: Simulation) -> tuple[Touchdown, ...]:
     touchdowns, lasting = [], round(SHORTEST_CONTACT / TIME_STEP)
     for i, side in enumerate(SIDES):
-        swings = np.diff(np.concatenate([[1.0], plan.bears(side, simulation.t), [1.0]]))
+        swings = np.diff(np.concatenate([[1.0], plan.bears(side, simulation.plan_t), [1.0]]))
         for lifted, set_down in zip(np.flatnonzero(swings < 0), np.flatnonzero(swings > 0), strict=True):
             planned = min(int(set_down), len(simulation.t) - 1)
             middle = (int(lifted) + planned) // 2
@@ -227,16 +227,20 @@ def measure_walk(plan: Plan, simulation: Simulation, drive: Drive, steps: int) -
     measurements = measure(plan, simulation, drive)
     way = _find_planned_way(plan)
     planned, (walked, drift) = math.hypot(*way), _measure_walked_distance(simulation, way)
-    energy = measurements.measured.total_W * plan.duration_s
+    during = simulation.plan_t <= plan.duration_s
+    late_s = float((simulation.t - simulation.plan_t)[during][-1])  # by which feedback delayed the end
+    energy = measurements.measured.total_W * (plan.duration_s + late_s)
     fell = simulation.fell_at_s
     return Walk(
         steps=steps,
-        steps_done=steps if fell is None else min(steps, math.floor(steps * fell / plan.duration_s)),
+        steps_done=steps
+        if fell is None
+        else min(steps, math.floor(steps * float(simulation.plan_t[-1]) / plan.duration_s)),
         planned_m=planned,
         walked_m=walked if fell is None else None,
         drift_m=drift if fell is None else None,
         heading_deg=math.degrees(float(np.unwrap(simulation.heading)[-1])) if fell is None else None,
-        planned_heading_deg=math.degrees(float(plan.heading(simulation.t)[-1])),
+        planned_heading_deg=math.degrees(float(plan.heading(simulation.plan_t)[-1])),
         model_J_per_m=measurements.predicted.total_W * plan.duration_s / planned if planned > 0.0 else math.inf,
         engine_J_per_planned_m=energy / planned if fell is None and planned > 0.0 else None,
         engine_J=energy if fell is None else None,
@@ -274,14 +278,14 @@ class ClimbMeasurements:
 
 def measure_climb(plan: Plan, simulation: Simulation) -> ClimbMeasurements:
     """Compute the numbers of a simulation on stairs."""
-    feet = {side: plan.at(f"{side}_foot", simulation.t) for side in SIDES}
-    bears = {side: np.diff(plan.bears(side, simulation.t), prepend=1.0) > 0.0 for side in SIDES}
+    feet = {side: plan.at(f"{side}_foot", simulation.plan_t) for side in SIDES}
+    bears = {side: np.diff(plan.bears(side, simulation.plan_t), prepend=1.0) > 0.0 for side in SIDES}
     landings = sorted((int(k), side) for side in SIDES for k in np.flatnonzero(bears[side]))
     instants = [k for k, _ in landings]
     errors = [float(np.linalg.norm(simulation.feet[k, SIDES.index(side)] - feet[side][k])) for k, side in landings]
     levels = [float(feet[side][k, 2]) for k, side in landings]
     higher = np.diff(levels, prepend=max(float(path[0, 2]) for path in feet.values())) > ON_GROUND
-    hips = plan.at("hip", simulation.t)[:, 2], simulation.torso[:, 2]
+    hips = plan.at("hip", simulation.plan_t)[:, 2], simulation.torso[:, 2]
     planned, measured = (np.diff(hip[[0, *instants]]) for hip in hips)
     half_tread = (plan.ground[1].edge_m - plan.ground[0].edge_m) / 2
     good = np.cumprod([error < half_tread for error in errors])

@@ -10,10 +10,11 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Columns, Signals, make_vector_columns
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.engine import Addresses, load_mujoco
+from nlp_gait.simulation.engine import Addresses, load_mujoco, measure_pressure
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
 
+LONGEST_WALK = 3  # simulated times the planned duration, where feedback delays the plan
 SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot that has lost its balance falls within it
 FALLEN_TILT = math.radians(45.0)
 FALLEN_HEIGHT = 0.6  # of the torso's planned height at the start; sinking by the rest below the plan is a fall
@@ -25,7 +26,6 @@ COLUMNS = {
     "loads": Columns(unit="N", labels=SIDES),
     "pressure": make_vector_columns("m", "xy"),
 }
-LEAST_LOAD = 1.0  # [N]; below this total load there is no centre of pressure
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,6 +78,7 @@ class Simulation:
     """Measurements at every step of the engine; the first axis is time, axes are those of the floor."""
 
     t: Array  #: (T,) [s]
+    plan_t: Array  #: (T,) time of the plan that the robot follows, which feedback delays or hastens [s]
     states: Array  #: (T, Q) the engine's coordinates: place [m] and attitude of the root, angles of the joints [rad]
     q: Array  #: (T, J) joint angles, columns as in the plan [rad]
     qd: Array  #: (T, J) [rad/s]
@@ -93,7 +94,7 @@ class Simulation:
 
     def signals(self, joints: tuple[str, ...]) -> Signals:
         """Return the time histories, for an archive."""
-        arrays = {name: getattr(self, name) for name in ("t", "q", "qd", "torque", "set_points", *COLUMNS)}
+        arrays = {name: getattr(self, name) for name in ("t", "plan_t", "q", "qd", "torque", "set_points", *COLUMNS)}
         driven = {"torque": Columns(unit="Nm", labels=joints), "set_points": Columns(unit="rad", labels=joints)}
         return Signals(joints=joints, arrays=arrays, columns=COLUMNS | driven)
 
@@ -109,38 +110,41 @@ def simulate_plan(
     drive, conditions = drive or Drive(), conditions or Conditions()
     model, data = prepare(plan, conditions, drive, sole)
     addresses = Addresses(model, plan)
-    steps = round((plan.duration_s + SETTLE_TIME) / TIME_STEP)
-    times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
+    times = TIME_STEP * np.arange(round((plan.duration_s + SETTLE_TIME) / TIME_STEP))
     commands = drive.set_points(plan.at, times, [plan.robot.joint(name) for name in plan.joints])
     heights, axes_planned = plan.at("hip", times)[:, 2], plan.torso_axis(times)
-    least_heights = (heights - (1.0 - FALLEN_HEIGHT) * heights[0]).tolist()
+    least_heights = heights - (1.0 - FALLEN_HEIGHT) * heights[0]
     rows: list[tuple[Any, ...]] = []
     fell_at_s = None
-    balance = drive.balance(plan, model)
+    corrector = drive.make_corrector(plan, prepare(plan, Conditions(), drive, sole)[0])
     push = conditions.push
     pushed_s = plan.duration_s / 2 if push is None or push.start_s is None else push.start_s
-    for t, command, axis, least_height in zip(times.tolist(), commands, axes_planned, least_heights, strict=True):
-        if balance is not None:
-            command[:] = balance.correct(command, data)  # in place: the result contains these set-points
+    for step in range(LONGEST_WALK * len(times)):
+        t = step * TIME_STEP
+        plan_time = t if corrector is None else corrector.find_plan_time(t)
+        k = round(plan_time / TIME_STEP)
+        if k >= len(times):
+            break
+        command = commands[k] if corrector is None else corrector.correct(commands[k], data)
         data.ctrl[addresses.actuators] = command
         if push is not None:
             data.xfrc_applied[addresses.torso, :2] = push.force(t - pushed_s)
         state, qd = data.qpos.copy(), data.qvel[addresses.rates]
         engine.mj_step(model, data)  # leaves positions, forces and contacts of the instant at which it began
         torso, axes = data.xpos[addresses.torso].copy(), data.xmat[addresses.torso]
-        upright, heading = float(axes[2::3] @ axis), math.atan2(axes[3], axes[0])
+        upright, heading = float(axes[2::3] @ axes_planned[k]), math.atan2(axes[3], axes[0])
         feet, torque = data.site_xpos[addresses.soles], data.actuator_force[addresses.actuators]
-        rows.append((state, qd, torque, torso, upright, heading, feet, *_measure_pressure(data, addresses)))
+        measured = state, qd, torque, torso, upright, heading, feet, *measure_pressure(data, addresses)
+        rows.append((t, plan_time, np.array(command), *measured))
         diverged = not np.isfinite(data.qvel).all()
-        if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < least_height:
+        if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < least_heights[k]:
             fell_at_s = t
             break
     columns = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
-    measured = dict(zip(("states", "qd", "torque", *COLUMNS), columns, strict=True))
+    measured = dict(zip(("t", "plan_t", "set_points", "states", "qd", "torque", *COLUMNS), columns, strict=True))
     measured["q"] = measured["states"][:, addresses.angles]
     measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows have its cosine
-    n = len(rows)
-    return Simulation(t=times[:n], set_points=commands[:n], **measured, fell_at_s=fell_at_s)
+    return Simulation(**measured, fell_at_s=fell_at_s)
 
 
 def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:
@@ -168,18 +172,6 @@ def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tupl
     data.qpos[addresses.angles], data.qvel[addresses.rates] = plan.at("q", start)[0], plan.rate("q", start)[0]
     engine.mj_forward(model, data)
     return model, data
-
-
-def _measure_pressure(data: Any, addresses: Addresses) -> tuple[Array, Array]:
-    """Return the normal forces on both feet (2,) [N] and the centre of pressure (2,) [m], from all contacts with the floor."""
-    contact = data.contact
-    active = contact.efc_address >= 0
-    forces = data.efc_force[contact.efc_address[active]]  # the first row of an elliptic contact is along its normal
-    feet = addresses.foot_of_geometry[contact.geom[active].max(axis=1)]  # the ground's geometries come first
-    loads = np.array([forces[feet == i].sum() for i in range(len(SIDES))])
-    total = forces.sum()
-    centre = forces @ contact.pos[active, :2] / total if total > LEAST_LOAD else np.full(2, np.nan)
-    return loads, centre
 
 
 DIRECTIONS = {"forward": (1, 0), "backward": (-1, 0), "left": (0, 1), "right": (0, -1)}

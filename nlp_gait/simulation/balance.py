@@ -1,0 +1,369 @@
+"""Balance feedback of planned walks: ZMP, footholds and times of steps by the divergent component of motion, whole-body torques."""
+
+import copy
+import math
+from collections import deque
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array
+from nlp_gait.simulation.engine import Addresses, check_period, load_mujoco, measure_loads
+from nlp_gait.simulation.feedback import to_rotation_vector
+from nlp_gait.simulation.footholds import StepLimits, choose_step, clip_to_soles
+from nlp_gait.simulation.plan import Plan
+from nlp_gait.simulation.walk_reference import Phase, WalkReference
+from nlp_gait.simulation.whole_body import Targets, WholeBodyQP
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Balance:
+    """Settings for all robots: lengths in heights h of the centre of mass, times in sqrt(h / g) = 1 / w, loads in weights.
+
+    Source:
+        Gain: Caron, Kheddar, Tempier (2019). The others are choices; `python -m benchmarks.balance` shows what they reach.
+    """
+
+    period_s: float = 0.004  # between two measurements
+    delay_s: float = 0.0  # from a measurement to the drives
+    noise: float = 0.0  # factor of ``NOISE``
+    seed: int = 0
+    dcm_gain: float = 2.3  # of the ZMP by the error of the divergent component: 1 + k / w
+    height_rate: float = 3.0  # natural frequencies [w], critically damped: of the height of the centre of mass,
+    torso_rate: float = 4.0  # of the torso's attitude,
+    swing_rate: float = 7.0  # of the swinging foot,
+    joint_rate: float = 6.0  # of the joints
+    friction: float = 0.5  # coefficient that contact forces may use
+    edge: float = 0.9  # share of the sole that the ZMP may use
+    reserve: float = 0.7  # share of the ankles' range that the choice of a foothold counts on
+    fastest: float = 1.3  # least time of a whole swing [1 / w]
+    slowest: float = 1.3  # longest time of a swing, relative to the planned one
+    hurry: float = 0.25  # change of a foothold [h] that costs as much as a change of its time by 1 / w
+    reach: float = 0.6  # farthest foothold from the standing foot, forward and sideways [h]
+    gap: float = 0.1  # between soles that pass each other [widths of the sole]
+    load_rate: float = 6.0  # of a foot's load after touch-down and before lift-off [weight w]
+    touch: float = 0.05  # load of a foot that has landed
+    stiffness: float = (
+        0.3  # of the drives, relative to the open loop's: torques are commanded, and damped between measurements
+    )
+
+    def __post_init__(self) -> None:
+        for setting in fields(self):
+            value = getattr(self, setting.name)
+            if not 0.0 <= value < math.inf:
+                raise InputError(f"{setting.name} of a balance feedback must be >= 0, got {value!r}")
+        check_period("balance feedback", self.period_s)
+
+
+class RobotState(NamedTuple):
+    """Measured state of the whole robot at one instant."""
+
+    positions: Array  # (Q,) the engine's coordinates
+    velocities: Array  # (V,)
+    loads: Array  # (2,) normal forces on the feet [N]
+
+
+# Standard deviations of the root's place [m], attitude [rad], velocity [m/s] and rate [rad/s], of joint angles [rad] and rates [rad/s].
+NOISE = {"place": 5e-4, "attitude": 1e-3, "velocity": 0.012, "rate": 0.01, "angle": 3e-4, "joint_rate": 0.02}
+EARLY = 0.6  # share of a swing after which a contact is a landing
+LANDING_SHARE = 0.85  # of a swing, at which the foot is above its foothold
+LANDED_LOAD, EARLY_LOAD, MOST_LOAD = 0.1, 0.1, 3.0  # [weight]
+SEARCH_SPEED, DEEPEST = 0.1, 0.15  # of a foot that is late [h w], [h]
+GOAL_SPEED = 0.8  # of a foothold [h w]
+CLOCK_FILTER, SLOWEST_CLOCK, FASTEST_CLOCK = 0.2, 0.3, 4.0
+
+
+class StateSensor:
+    """Sensors of a whole robot in one simulation, with noise and delay."""
+
+    def __init__(self, settings: Balance, model: Any, addresses: Addresses) -> None:
+        self._settings, self._addresses, self._engine = settings, addresses, load_mujoco()
+        self._every = max(1, round(settings.period_s / float(model.opt.timestep)))
+        self._late = round(settings.delay_s / float(model.opt.timestep))
+        self._random = np.random.default_rng(settings.seed)
+        self._waiting: deque[tuple[int, RobotState]] = deque()
+        self._steps = 0
+
+    def read(self, data: Any) -> RobotState | None:
+        """Return the state that arrives at this step of the engine, None if there is none; call it once in each step."""
+        if self._steps % self._every == 0:
+            self._waiting.append((self._steps + self._late, self._measure(data)))
+        arrived = bool(self._waiting) and self._waiting[0][0] <= self._steps
+        self._steps += 1
+        return self._waiting.popleft()[1] if arrived else None
+
+    def _measure(self, data: Any) -> RobotState:
+        positions, velocities = data.qpos.copy(), data.qvel.copy()
+        if self._settings.noise > 0.0:
+            joints = len(positions) - 7
+            noise = {
+                name: self._settings.noise
+                * size
+                * self._random.standard_normal(joints if "joint" in name or name == "angle" else 3)
+                for name, size in NOISE.items()
+            }
+            positions[:3] += noise["place"]
+            self._engine.mju_quatIntegrate(positions[3:7], noise["attitude"], 1.0)
+            positions[7:] += noise["angle"]
+            velocities += np.concatenate([noise["velocity"], noise["rate"], noise["joint_rate"]])
+        return RobotState(positions, velocities, measure_loads(data, self._addresses))
+
+
+class StepClock:
+    """Where a walk is: the plan's time and phase, the feet's offsets from the plan, and the foothold that is aimed at."""
+
+    def __init__(self, settings: Balance, reference: WalkReference) -> None:
+        self._settings, self._reference = settings, reference
+        self.time_s, self.rate = 0.0, 1.0  # of the plan, and seconds of it per second
+        self.ended_s = 0.0  # since the end of the plan
+        self._number, self.touched = 0, False
+        self.offsets = np.zeros((2, 3))  # of the feet from their planned places [m]
+        self.goal, self.origin = np.zeros(2), np.zeros(2)  # of the swinging foot's offset, and where it began
+        self.lowered_m = 0.0  # by a foot that searches the ground
+
+    @property
+    def phase(self) -> Phase:
+        """The present phase."""
+        return self._reference.phases[self._number]
+
+    @property
+    def before(self) -> Phase | None:
+        """The phase before it."""
+        return self._reference.phases[self._number - 1] if self._number else None
+
+    @property
+    def after(self) -> Phase | None:
+        """The phase after it."""
+        rest = self._reference.phases[self._number + 1 :]
+        return rest[0] if rest else None
+
+    @property
+    def stands(self) -> tuple[bool, bool]:
+        """Whether the feet are on the ground."""
+        left, right = (i != self.phase.swing or self.touched for i in (0, 1))
+        return left, right
+
+    def advance(self, loads: Array, feet: Array) -> None:
+        """Go on by one period: loads (2,) on the feet in weights, feet (2, 3) their places [m]."""
+        settings, reference, phase = self._settings, self._reference, self.phase
+        time = self.time_s + self.rate * settings.period_s
+        if phase.swing is None:
+            if time >= phase.end_s and self.after is not None:
+                self._number += 1
+                swing = self.phase.swing or 0
+                self.origin, self.goal = self.offsets[swing, :2].copy(), self.offsets[1 - swing, :2].copy()
+                self.lowered_m = 0.0
+        else:
+            done = (time - phase.start_s) / (phase.end_s - phase.start_s)
+            touches = bool(loads[phase.swing] > settings.touch)
+            self.touched = self.touched or (touches and done > EARLY)  # early: it stands, and the clock goes on
+            if time >= phase.end_s and (self.touched or touches or self.lowered_m > DEEPEST * reference.height):
+                self._number += 1 if self.after is not None else 0
+                self.rate, self.touched = 1.0, False
+            elif time >= phase.end_s:  # late: it goes down until the ground is there
+                time = phase.end_s - 1e-9
+                self.lowered_m += SEARCH_SPEED * reference.height * reference.rate * settings.period_s
+        self.time_s = min(time, reference.duration_s)
+        self.ended_s += time - self.time_s
+        planned = reference.sample("feet", self.time_s).reshape(2, 3)
+        for i, stands in enumerate(self.stands):
+            if stands:
+                self.offsets[i] = feet[i] - planned[i]
+
+    def aim(self, error: Array) -> None:
+        """Choose foothold and time of the swinging foot by the error (2,) of the divergent component from the standing foot [m]."""
+        s, reference, phase = self._settings, self._reference, self.phase
+        assert phase.swing is not None
+        height, rate, stance = reference.height, reference.rate, 1 - phase.swing
+        left, total = phase.end_s - self.time_s, phase.end_s - phase.start_s
+        yaw = float(reference.sample("yaw", self.time_s)[stance])
+        to_sole = np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]])
+        limits = self._find_limits(phase.swing, min(self.time_s + left / 2, phase.end_s), to_sole)
+        fastest = left / total * min(s.fastest / rate, total)
+        time, shift = choose_step(to_sole @ error, left, fastest, s.slowest * left, limits, s.hurry * height)
+        self.rate += CLOCK_FILTER * (float(np.clip(left / max(time, 1e-3), SLOWEST_CLOCK, FASTEST_CLOCK)) - self.rate)
+        if left / self.rate > 0.1 / rate:
+            step = GOAL_SPEED * height * rate * s.period_s
+            self.goal += np.clip(self.offsets[stance, :2] + to_sole.T @ shift - self.goal, -step, step)
+
+    def _find_limits(self, swing: int, time_s: float, to_sole: Array) -> StepLimits:
+        """Return the limits of a step in the axes of the standing sole; the ankles' range is that at a time of the plan."""
+        s, reference, stance, end = self._settings, self._reference, 1 - swing, self.phase.end_s
+        feet = reference.sample("feet", time_s).reshape(2, 3)
+        zmp = to_sole @ (reference.sample("zmp", time_s) - feet[stance, :2])
+        front, back, left, right = s.edge * reference.zmp_reach[stance]
+        landing = reference.sample("feet", end).reshape(2, 3)
+        apart = to_sole @ (landing[swing, :2] - landing[stance, :2])
+        far, side = s.reach * reference.height, 1.0 if swing == 0 else -1.0
+        closest = (reference.soles[0, 3] + reference.soles[1, 2]) * (1.0 + s.gap) - side * apart[1]
+        low, high = np.minimum(-far - apart, 0.0), np.maximum(far - apart, 0.0)
+        if swing == 0:
+            low[1] = min(closest, high[1])
+        else:
+            high[1] = max(-closest, low[1])
+        return StepLimits(
+            rate=reference.rate,
+            carry=float(reference.sample("carry", end + 1e-6)[0]),
+            zmp_low=s.reserve * np.minimum(np.array([-back, -right]) - zmp, 0.0),
+            zmp_high=s.reserve * np.maximum(np.array([front, left]) - zmp, 0.0),
+            shift_low=low,
+            shift_high=high,
+        )
+
+    def compute_offsets(self) -> tuple[Array, Array]:
+        """Return the offsets (2,) of the divergent component and of the ZMP from the plan [m], by those of the feet."""
+        reference, phase = self._reference, self.phase
+        if phase.swing is not None:
+            stance = self.offsets[1 - phase.swing, :2]
+            carry = float(reference.sample("carry", phase.end_s)[0])
+            carry *= math.exp(-reference.rate * (phase.end_s - self.time_s) / self.rate)
+            return stance + carry * (self.goal - stance), stance
+        landed = 0 if self.before is None or self.before.swing is None else self.before.swing
+        carry = float(reference.sample("carry", self.time_s)[0])
+        load = float(reference.sample("load_left", self.time_s)[0])
+        dcm = (1.0 - carry) * self.offsets[1 - landed] + carry * self.offsets[landed]
+        return dcm[:2], (load * self.offsets[0] + (1.0 - load) * self.offsets[1])[:2]
+
+    def find_most_load(self, foot: int) -> float:
+        """Return the largest load of a foot [weight]: it rises after touch-down and falls before lift-off."""
+        phase, slope = self.phase, self._settings.load_rate * self._reference.rate
+        if phase.swing is not None:
+            return EARLY_LOAD if phase.swing == foot else MOST_LOAD
+        most = MOST_LOAD
+        if self.after is not None and self.after.swing == foot:
+            most = min(most, self._settings.touch + slope * (phase.end_s - self.time_s))
+        if self.before is not None and self.before.swing == foot:
+            most = min(most, LANDED_LOAD + slope * (self.time_s - phase.start_s))
+        return most
+
+
+class WholeBodyBalance:
+    """Controller of one simulation: corrects the set-points of drives whose stiffness and damping (J,) it knows."""
+
+    def __init__(
+        self, settings: Balance, plan: Plan, gains: tuple[Array, Array], torque_limits: Array, model: Any
+    ) -> None:
+        if plan.planar:
+            raise InputError("balance feedback needs a robot that moves in space; this one moves in a plane")
+        self._settings, self._engine = settings, load_mujoco()
+        self._stiffness, self._damping = gains
+        self._model = copy.deepcopy(model)
+        self._model.opt.disableflags |= int(self._engine.mjtDisableBit.mjDSBL_CONTACT)
+        self._data = self._engine.MjData(self._model)
+        self._addresses = Addresses(self._model, plan)
+        self._reference = WalkReference(plan, self._model, torque_limits)
+        self._qp = WholeBodyQP(self._reference, self._model, self._addresses, torque_limits, settings.friction)
+        self._sensor = StateSensor(settings, self._model, self._addresses)
+        self.clock = StepClock(settings, self._reference)
+        self._command: Array | None = None
+
+    def find_plan_time(self, time_s: float) -> float:
+        """Return the time of the plan that the robot has reached, and the time since the plan's end [s]."""
+        return self.clock.time_s + self.clock.ended_s
+
+    def correct(self, command: Array, data: Any) -> Array:
+        """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
+        state = self._sensor.read(data)
+        if state is not None:
+            self._command = self._update(state)
+        return command if self._command is None else self._command
+
+    def _update(self, state: RobotState) -> Array:
+        """Return the set-points (J,) [rad] that give the torques of balance, damped towards the rates that these reach."""
+        data, engine, joints = self._data, self._engine, self._addresses
+        data.qpos[:], data.qvel[:] = state.positions, state.velocities
+        engine.mj_fwdPosition(self._model, data)
+        engine.mj_fwdVelocity(self._model, data)
+        engine.mj_subtreeVel(self._model, data)
+        feet = data.site_xpos[joints.soles].copy()
+        weight = self._reference.mass * -float(self._model.opt.gravity[2])
+        self.clock.advance(state.loads / weight, feet)
+        solution = self._qp.solve(data, self._collect_targets(data, feet, weight))
+        q, qd = data.qpos[joints.angles], data.qvel[joints.rates]
+        if solution is None:
+            return q.copy() if self._command is None else self._command
+        torque, acceleration = solution
+        soon = qd + acceleration * self._settings.period_s
+        return np.asarray(q + (torque + self._damping * soon) / self._stiffness)
+
+    def _collect_targets(self, data: Any, feet: Array, weight: float) -> Targets:
+        """Return the accelerations and loads that lead back to the plan."""
+        s, reference, clock = self._settings, self._reference, self.clock
+        rate, sample = reference.rate, lambda name: reference.sample(name, clock.time_s)
+        com, velocity = data.subtree_com[0], data.subtree_linvel[0]
+        dcm = com[:2] + velocity[:2] / rate
+        if clock.phase.swing is not None:
+            clock.aim(dcm - sample("dcm") - clock.offsets[1 - clock.phase.swing, :2])
+        dcm_offset, zmp_offset = clock.compute_offsets()
+        planned_zmp = sample("zmp") + zmp_offset
+        standing = [i for i, stands in enumerate(clock.stands) if stands]
+        zmp = planned_zmp + s.dcm_gain * (dcm - sample("dcm") - dcm_offset)
+        zmp = clip_to_soles(zmp, feet[standing, :2], sample("yaw")[standing], s.edge * reference.zmp_reach[standing])
+        ended = clock.time_s >= reference.duration_s
+        mass = np.empty(3)
+        mass[:2] = rate**2 * (com[:2] - zmp) + (0.0 if ended else sample("lever"))
+        height = sample("com")[2] + np.mean([clock.offsets[i, 2] for i in standing])
+        mass[2] = _track(
+            s.height_rate * rate, height - com[2], sample("com_rate")[2] - velocity[2], sample("com_acceleration")[2]
+        )
+        mass[2] = np.clip(mass[2], -0.6 * reference.plan.gravity, 0.8 * reference.plan.gravity)
+        joints = self._addresses
+        q_error, qd_error = sample("q") - data.qpos[joints.angles], clock.rate * sample("qd") - data.qvel[joints.rates]
+        load = float(sample("load_left")[0])
+        if len(standing) == 2:  # the load is divided as the commanded ZMP divides it
+            apart = feet[0, :2] - feet[1, :2]
+            load = float(np.clip(load + (zmp - planned_zmp) @ apart / (apart @ apart), 0.0, 1.0))
+        left, right = (weight * clock.find_most_load(i) for i in (0, 1))
+        return Targets(
+            mass=mass,
+            torso=self._turn_torso(data),
+            feet=np.stack([self._move_foot(i, data, feet) for i in (0, 1)]),
+            stands=clock.stands,
+            joints=_track(s.joint_rate * rate, q_error, qd_error),
+            load_left=load,
+            most_load=(left, right),
+        )
+
+    def _turn_torso(self, data: Any) -> Array:
+        """Return the angular acceleration (3,) that leads the torso back to its planned attitude [rad/s^2]."""
+        time, ahead, engine = self.clock.time_s, 0.01, self._engine
+        rotation, planned, soon = data.xmat[self._addresses.torso].reshape(3, 3), np.zeros(9), np.zeros(9)
+        for matrix, at_time in ((planned, time), (soon, time + ahead)):
+            quaternion = self._reference.sample("attitude", at_time)
+            engine.mju_quat2Mat(matrix, quaternion / np.linalg.norm(quaternion))
+        planned, soon = planned.reshape(3, 3), soon.reshape(3, 3)
+        rate = to_rotation_vector(soon @ planned.T) / ahead * self.clock.rate
+        error = to_rotation_vector(planned @ rotation.T)
+        return _track(self._settings.torso_rate * self._reference.rate, error, rate - rotation @ data.qvel[3:6])
+
+    def _move_foot(self, foot: int, data: Any, feet: Array) -> Array:
+        """Return the acceleration (6,) of a sole: none if it stands, else along the planned path to the new foothold."""
+        s, reference, clock = self._settings, self._reference, self.clock
+        rate, velocity = s.swing_rate * reference.rate, np.zeros(6)
+        kind = self._engine.mjtObj.mjOBJ_SITE
+        self._engine.mj_objectVelocity(self._model, data, kind, self._addresses.soles[foot], velocity, 0)
+        if clock.stands[foot]:
+            return -2.0 * rate * np.roll(velocity, 3)
+        phase = clock.phase
+        span = LANDING_SHARE * (phase.end_s - phase.start_s)
+        done = min(max((clock.time_s - phase.start_s) / span, 0.0), 1.0)
+        moved = clock.goal - clock.origin
+        offset = np.append(
+            clock.origin + done * done * (3.0 - 2.0 * done) * moved, clock.offsets[1 - foot, 2] - clock.lowered_m
+        )
+        place = reference.sample("feet", clock.time_s)[3 * foot : 3 * foot + 3] + offset
+        planned_rate = reference.sample("feet_rate", clock.time_s)[3 * foot : 3 * foot + 3].copy()
+        planned_rate[:2] += 6.0 * done * (1.0 - done) / span * moved
+        yaw = float(reference.sample("yaw", clock.time_s)[foot])
+        planned = np.array([[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
+        tilt = to_rotation_vector(planned @ data.site_xmat[self._addresses.soles[foot]].reshape(3, 3).T)
+        turning = np.array([0.0, 0.0, clock.rate * reference.sample("yaw_rate", clock.time_s)[foot]])
+        linear = _track(rate, place - feet[foot], clock.rate * planned_rate - velocity[3:])
+        return np.concatenate([linear, _track(rate, tilt, turning - velocity[:3])])
+
+
+def _track(rate: float, error: Any, rate_error: Any, acceleration: Any = 0.0) -> Any:
+    """Return the acceleration of critically damped tracking with a natural frequency [1/s]."""
+    return acceleration + rate**2 * error + 2.0 * rate * rate_error

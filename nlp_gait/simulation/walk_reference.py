@@ -1,0 +1,152 @@
+"""A planned walk as balance feedback follows it: phases, divergent component of motion, loads, on one even grid of times."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nlp_gait.formulation import Array
+from nlp_gait.simulation.engine import Addresses, load_mujoco
+from nlp_gait.simulation.feedback import compute_load_shares
+from nlp_gait.simulation.plan import SIDES, Plan
+
+STEP_S = 0.002  # of the grid
+SMOOTHING = 11  # samples over which the accelerations of the centre of mass are averaged
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """Double support, or single support with the number of the swinging foot in ``SIDES``."""
+
+    start_s: float
+    end_s: float
+    swing: int | None = None
+
+
+class WalkReference:
+    """Reference of one walk; places are in the floor's axes [m], and ``sample`` interpolates linearly.
+
+    Names are ``q``, ``qd``, ``zmp`` (2,), ``com``, ``com_rate``, ``com_acceleration`` (3,), ``dcm`` (2,), ``lever`` (2,) what the
+    pendulum leaves of the horizontal acceleration, ``load_left`` (1,), ``carry`` (1,) effect of the next foothold on the
+    divergent component, ``feet``, ``feet_rate`` (6,), ``yaw``, ``yaw_rate`` (2,) of the soles, ``attitude`` (4,) of the torso.
+    """
+
+    def __init__(self, plan: Plan, model: Any, torque_limits: Array) -> None:
+        self.plan, self.duration_s = plan, plan.duration_s
+        self.mass = float(model.body_subtreemass[0])
+        times = STEP_S * np.arange(int(np.ceil(plan.duration_s / STEP_S)) + 2)
+        com = _follow_mass(plan, model, times)
+        self.height = float(com[0, 2] - min(plan.at(f"{side}_foot", times[:1])[0, 2] for side in SIDES))
+        self.rate = float(np.sqrt(plan.gravity / self.height))  # of the pendulum [1/s]
+        self.soles = np.array([[f.front_m, f.back_m, f.left_m, f.right_m] for f in (plan.robot.feet[s] for s in SIDES)])
+        self.zmp_reach = np.minimum(self.soles, _find_ankle_reach(plan, model, torque_limits))
+        stands = np.stack([plan.stands(side, times) for side in SIDES], axis=1) > 0.5
+        self.phases = _split(times, stands)
+        feet = np.concatenate([plan.at(f"{side}_foot", times) for side in SIDES], axis=1)
+        yaw = np.stack([np.arctan2(*plan.direction(i, times).T[::-1]) for i in range(2)], axis=1)
+        velocity = np.gradient(com, STEP_S, axis=0)
+        velocity[[0, -1]] = 0.0
+        kernel, pad = np.ones(SMOOTHING) / SMOOTHING, SMOOTHING // 2
+        acceleration = np.gradient(velocity, STEP_S, axis=0)
+        acceleration = np.stack(
+            [np.convolve(np.pad(a, pad, mode="edge"), kernel, "valid") for a in acceleration.T], axis=1
+        )
+        zmp, load = plan.at("zmp", times), compute_load_shares(plan, times)[:, 0]
+        arrays = {
+            "q": plan.at("q", times),
+            "qd": plan.rate("q", times),
+            "zmp": zmp,
+            "com": com,
+            "com_rate": velocity,
+            "com_acceleration": acceleration,
+            "dcm": com[:, :2] + velocity[:, :2] / self.rate,
+            "lever": acceleration[:, :2] - self.rate**2 * (com[:, :2] - zmp),
+            "load_left": load[:, None],
+            "carry": _integrate_carry(self.phases, load, self.rate)[:, None],
+            "feet": feet,
+            "feet_rate": np.gradient(feet, STEP_S, axis=0),
+            "yaw": yaw,
+            "yaw_rate": np.gradient(np.unwrap(yaw, axis=0), STEP_S, axis=0),
+            "attitude": plan.attitude(times),
+        }
+        self._rows, self._columns, end = np.hstack(list(arrays.values())), dict[str, slice](), 0
+        for name, array in arrays.items():
+            self._columns[name] = slice(end, end + array.shape[1])
+            end += array.shape[1]
+        self._last: tuple[float, Array] = (-1.0, self._rows[0])
+
+    def sample(self, name: str, time_s: float) -> Array:
+        """Return a quantity at a time of the plan."""
+        if time_s != self._last[0]:
+            place = min(max(time_s / STEP_S, 0.0), len(self._rows) - 1.0)
+            k = min(int(place), len(self._rows) - 2)
+            self._last = time_s, self._rows[k] + (place - k) * (self._rows[k + 1] - self._rows[k])
+        return np.asarray(self._last[1][self._columns[name]])
+
+
+def _follow_mass(plan: Plan, model: Any, times: Array) -> Array:
+    """Return the planned centre of mass (T, 3) [m]."""
+    engine, addresses = load_mujoco(), Addresses(model, plan)
+    data, com = engine.MjData(model), np.zeros((len(times), 3))
+    for k, (place, attitude, q) in enumerate(
+        zip(plan.at("hip", times), plan.attitude(times), plan.at("q", times), strict=True)
+    ):
+        data.qpos[:3], data.qpos[3:7], data.qpos[addresses.angles] = place, attitude, q
+        engine.mj_kinematics(model, data)
+        engine.mj_comPos(model, data)
+        com[k] = data.subtree_com[0]
+    return com
+
+
+def _find_ankle_reach(plan: Plan, model: Any, torque_limits: Array) -> Array:
+    """Return how far (2 feet; front, back, left, right) the ankles' torques hold the weight from the ankle [m].
+
+    The ankle has the joints of the foot and, where the two joints are no farther apart than the ankle is high, of its parent.
+    """
+    engine, addresses, reach = load_mujoco(), Addresses(model, plan), np.zeros((2, 4))
+    data, limit_of = engine.MjData(model), dict(zip(addresses.rates.tolist(), torque_limits, strict=True))
+    engine.mj_kinematics(model, data)
+    for i, side in enumerate(SIDES):
+        foot = plan.robot.feet[side]
+        body = model.body(foot.link).id
+        joints = [model.body_jntadr[body]]
+        if np.linalg.norm(model.body_pos[body]) <= foot.ankle_height_m:
+            joints.append(model.body_jntadr[model.body_parentid[body]])
+        limits = np.array([limit_of[int(model.jnt_dofadr[joint])] for joint in joints])
+        roll, pitch, _ = np.abs(data.xaxis[joints]).T @ limits / (model.body_subtreemass[0] * plan.gravity)
+        reach[i] = pitch, pitch, roll, roll
+    return reach
+
+
+def _split(times: Array, stands: Array) -> list[Phase]:
+    """Return the phases of a walk from the times (T,) at which the feet (T, 2) stand."""
+    swing = np.where(stands.all(axis=1), -1, np.where(stands[:, 0], 1, 0))
+    cuts = [0, *(np.flatnonzero(np.diff(swing)) + 1).tolist(), len(swing) - 1]
+    return [
+        Phase(float(times[a]), float(times[b]), None if swing[a] < 0 else int(swing[a]))
+        for a, b in zip(cuts[:-1], cuts[1:], strict=True)
+    ]
+
+
+def _integrate_carry(phases: list[Phase], load_left: Array, rate: float) -> Array:
+    """Return the share w (T,) of the landing foot's offset in the offset of the divergent component: w' = rate (w - its load).
+
+    It is integrated backward from 1 at the end of each double support; in the swing before, the foot bears no load.
+    """
+    carry, decay = np.ones(len(load_left)), np.exp(-rate * STEP_S)
+    value, first = 1.0, True
+    for before, phase in zip([None, *phases[:-1]][::-1], phases[::-1], strict=True):
+        a, b = round(phase.start_s / STEP_S), round(phase.end_s / STEP_S)
+        if phase.swing is None:
+            if before is None:  # before the first step no foot has moved
+                carry[a:b] = 1.0
+                continue
+            load = load_left if before.swing == 0 else 1.0 - load_left
+            value = 1.0
+        else:
+            load = np.zeros(len(load_left))
+        if first:
+            carry[b:], first = value, False
+        for k in range(b - 1, a - 1, -1):
+            value = carry[k] = load[k] + (value - load[k]) * decay
+    return carry

@@ -1,0 +1,178 @@
+"""Whole-body control: joint torques whose accelerations and contact forces are nearest to what balance asks for."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nlp_gait.errors import MissingExtraError
+from nlp_gait.formulation import Array
+from nlp_gait.simulation.engine import load_mujoco
+from nlp_gait.simulation.walk_reference import WalkReference
+
+UNBOUNDED = 1e9
+REGULARISATION = 1e-8
+EQUAL, INEQUALITY = 5, 0  # DAQP's kinds of rows
+WRENCH = 6  # force and moment on a sole, in its axes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weights:
+    """Weights of squared accelerations, angular ones times the height of the centre of mass."""
+
+    mass: float = 10.0
+    torso: float = 2.0
+    swing: float = 1.0
+    swing_attitude: float = 0.3
+    stance: float = 100.0
+    joints: float = 1e-3
+    loads: float = 0.01  # of forces over the mass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Targets:
+    """Accelerations and loads at one instant, in the floor's axes."""
+
+    mass: Array  #: (3,) of the centre of mass [m/s^2]
+    torso: Array  #: (3,) angular [rad/s^2]
+    feet: Array  #: (2, 6) of the soles, linear [m/s^2] and angular [rad/s^2]
+    stands: tuple[bool, bool]  #: whether a foot is on the ground
+    joints: Array  #: (J,) [rad/s^2]
+    load_left: float  #: planned share of the weight on the left foot
+    most_load: tuple[float, float]  #: largest normal forces [N]
+
+
+class WholeBodyQP:
+    """Quadratic program of one robot in accelerations and contact wrenches; torque limits are hard.
+
+    Minimises the weighted squares of the errors of mass, torso, feet, joints and loads subject to the equations of motion of the
+    root, friction pyramids, centres of pressure within the soles, load limits, and torque limits. Joints that the plan never
+    moves follow their own target and are no variables.
+
+    Source:
+        Kuindersma et al. (2016); solved by DAQP, Arnstroem, Bemporad, Axehill (2022).
+    """
+
+    def __init__(
+        self, reference: WalkReference, model: Any, addresses: Any, torque_limits: Array, friction: float
+    ) -> None:
+        try:
+            import daqp
+        except ImportError as error:
+            raise MissingExtraError(
+                f"balance feedback needs DAQP ({error}); install it with pip install 'nlp-gait[sim]'"
+            ) from error
+        self._solver, self._engine, self.weights = daqp, load_mujoco(), Weights()
+        self._model, self._limits, self._rates = model, torque_limits, addresses.rates
+        self._soles, self._feet = addresses.soles, model.site_bodyid[addresses.soles]
+        self._height, self._gravity, self._mass = reference.height, model.opt.gravity.copy(), reference.mass
+        angles = reference.plan.signals.arrays["q"]
+        held = np.ptp(angles, axis=0) < 1e-6
+        self._held = self._rates[held]
+        self._free = np.concatenate([np.arange(6), self._rates[~held]])
+        self._free_joints = np.flatnonzero(~held)
+        self._cone = _make_cone(reference.soles, friction)
+        self.failures = 0
+
+    def solve(self, data: Any, targets: Targets) -> tuple[Array, Array] | None:
+        """Return joint torques (J,) [Nm] and accelerations (J,) [rad/s^2], None where DAQP finds no solution.
+
+        ``data`` has the measured positions and velocities, with positions and velocities computed.
+        """
+        engine, model, free, count = self._engine, self._model, self._free, len(self._free)
+        inertia, acceleration = np.zeros((model.nv, model.nv)), np.zeros(model.nv)
+        engine.mj_fullM(model, data, inertia)
+        acceleration[self._rates] = targets.joints
+        acceleration[free] = 0.0
+        jacobians, drift = self._differentiate_soles(data)
+        contact = np.concatenate([self._turn_into_sole(data, i, jacobians[i].T) for i in (0, 1)], axis=1)
+        tasks, goals, weights = self._collect_tasks(data, targets, jacobians, drift + jacobians @ acceleration)
+        weighted = tasks * weights[:, None]
+        hessian, linear = weighted.T @ tasks, -(goals @ weighted)
+        hessian[np.diag_indices(len(hessian))] += REGULARISATION
+        # Torques of all coordinates: motion @ x + rest; those of the root are zero.
+        motion, rest = np.hstack([inertia[:, free], -contact]), data.qfrc_bias + inertia @ acceleration
+        joints = self._rates
+        rows = np.vstack([motion[:6], motion[joints], np.hstack([np.zeros((len(self._cone), count)), self._cone])])
+        low = np.concatenate([-rest[:6], -self._limits - rest[joints], np.zeros(len(self._cone))])
+        high = np.concatenate([-rest[:6], self._limits - rest[joints], np.full(len(self._cone), UNBOUNDED)])
+        least, most, kind = self._bound_wrenches(targets)
+        low = np.concatenate([np.full(count, -UNBOUNDED), least, low])
+        high = np.concatenate([np.full(count, UNBOUNDED), most, high])
+        sense = np.zeros(len(low), dtype=np.int32)
+        sense[count : count + 2 * WRENCH] = kind
+        sense[count + 2 * WRENCH : count + 2 * WRENCH + 6] = EQUAL
+        x, _, flag, _ = self._solver.solve(hessian, linear, rows, high, low, sense)
+        if flag <= 0:
+            self.failures += 1
+            return None
+        acceleration[free] = x[:count]
+        return np.clip((motion @ x + rest)[joints], -self._limits, self._limits), acceleration[joints]
+
+    def _differentiate_soles(self, data: Any) -> tuple[Array, Array]:
+        """Return the soles' Jacobians (2, 6, V), and their accelerations (2, 6) at constant velocities."""
+        engine, model = self._engine, self._model
+        jacobians, rates = np.zeros((2, 6, model.nv)), np.zeros((2, 6, model.nv))
+        for i, (sole, foot) in enumerate(zip(self._soles, self._feet, strict=True)):
+            engine.mj_jacSite(model, data, jacobians[i, :3], jacobians[i, 3:], sole)
+            engine.mj_jacDot(model, data, rates[i, :3], rates[i, 3:], data.site_xpos[sole], foot)
+        return jacobians, rates @ data.qvel
+
+    def _turn_into_sole(self, data: Any, i: int, rows: Array) -> Array:
+        """Return forces and moments (V, 6) along the floor's axes along those of a sole."""
+        axes = data.site_xmat[self._soles[i]].reshape(3, 3)
+        return np.hstack([rows[:, :3] @ axes, rows[:, 3:] @ axes])
+
+    def _collect_tasks(self, data: Any, targets: Targets, jacobians: Array, known: Array) -> tuple[Array, Array, Array]:
+        """Return matrix, goals and weights of all tasks: feet, mass, torso, joints, loads; ``known`` (2, 6) is not variable."""
+        w, free, count = self.weights, self._free, len(self._free)
+        moving = len(self._free_joints)
+        ends = np.cumsum([0, 12, 3, 3, moving, 12]).tolist()
+        feet, mass, torso, joints, loads = map(slice, ends[:-1], ends[1:])
+        tasks, goals, weights = (np.zeros(shape) for shape in ((ends[-1], count + 12), ends[-1], ends[-1]))
+        tasks[feet, :count], goals[feet] = jacobians[:, :, free].reshape(12, -1), (targets.feet - known).ravel()
+        swing = np.repeat([w.swing, w.swing_attitude * self._height**2], 3)
+        weights[feet] = np.concatenate([np.full(6, w.stance) if stands else swing for stands in targets.stands])
+        for i in (0, 1):  # contact forces alone move the mass
+            axes = data.site_xmat[self._soles[i]].reshape(3, 3)
+            tasks[mass, count + WRENCH * i : count + WRENCH * i + 3] = axes / self._mass
+        goals[mass], weights[mass] = targets.mass - self._gravity, w.mass
+        tasks[torso, 3:6] = data.xmat[1].reshape(3, 3)  # rates of the root are in its own axes
+        goals[torso], weights[torso] = targets.torso, w.torso * self._height**2
+        tasks[joints, 6:count] = np.eye(moving)
+        goals[joints], weights[joints] = targets.joints[self._free_joints], w.joints * self._height**2
+        tasks[loads, count:] = np.diag(np.tile(np.repeat([1.0, 2.0 / self._height], 3), 2)) / self._mass
+        weight = -self._gravity[2]
+        goals[loads.start + 2], goals[loads.start + 8] = targets.load_left * weight, (1.0 - targets.load_left) * weight
+        weights[loads] = w.loads
+        return tasks, goals, weights
+
+    def _bound_wrenches(self, targets: Targets) -> tuple[Array, Array, Array]:
+        """Return lower and upper bounds and kinds (12,) of the wrenches: zero for a foot in the air."""
+        low, high, kind = np.zeros(12), np.zeros(12), np.full(12, EQUAL, dtype=np.int32)
+        for i, stands in enumerate(targets.stands):
+            if stands:
+                wrench = slice(WRENCH * i, WRENCH * (i + 1))
+                low[wrench], high[wrench], kind[wrench] = -UNBOUNDED, UNBOUNDED, INEQUALITY
+                high[WRENCH * i + 2] = targets.most_load[i]
+        return low, high, kind
+
+
+def _make_cone(soles: Array, friction: float) -> Array:
+    """Return rows (20, 12) that are >= 0 for wrenches within friction pyramids and with pressure within the soles."""
+    rows = []
+    for i, (front, back, left, right) in enumerate(0.95 * soles):
+        side, turn = friction / np.sqrt(2.0), friction * 0.4 * (front + back)
+        for column, sign, arm in (
+            *((0, sign, side) for sign in (1.0, -1.0)),
+            *((1, sign, side) for sign in (1.0, -1.0)),
+            *((5, sign, turn) for sign in (1.0, -1.0)),
+            (4, 1.0, front),
+            (4, -1.0, back),
+            (3, -1.0, left),
+            (3, 1.0, right),
+        ):
+            row = np.zeros(12)
+            row[WRENCH * i + 2], row[WRENCH * i + column] = arm, sign
+            rows.append(row)
+    return np.array(rows)
