@@ -15,7 +15,7 @@ from compare.analysis.units import format_millimetres, with_unit
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
 from compare.cli.options import StoredGait, parse_numbers
 from compare.cli.printing import Output, Rows, show_progress
-from nlp_gait.errors import InputError, unknown
+from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
 from nlp_gait.simulation.video import Frame, check_frames, check_video_path, write_video
 
@@ -47,16 +47,12 @@ class DriveOptions:
 
     def make(self) -> Drive:
         """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
-        from nlp_gait.simulation.drive import FEEDBACKS, load_drive
+        from nlp_gait.simulation.drive import load_drive, set_feedback
 
         drive = load_drive(self.drive)
         if self.torque_limits is not None:
             drive = replace(drive, torque_limits=self.torque_limits)
-        if self.feedback is None:
-            return drive
-        if self.feedback not in FEEDBACKS:
-            raise unknown("feedback", self.feedback, FEEDBACKS)
-        return replace(drive, **FEEDBACKS[self.feedback])
+        return drive if self.feedback is None else set_feedback(drive, self.feedback)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,9 +64,11 @@ class ConditionOptions:
     mass_factor: Annotated[float, Option(help="On all masses; the gait was planned for 1.")] = 1.0
     stiffness_factor: Annotated[float, Option(help="True stiffness of the joints over what their drive assumes.")] = 1.0
     push: Annotated[str | None, Option(metavar="X,Y[,S]", help=PUSH)] = None
+    bumps_mm: Annotated[float | None, Option(help="Tiles of random height on the ground, up to this.")] = None
 
     def make(self) -> Conditions:
         """Return the conditions; raises InputError for a value that is not allowed."""
+        from nlp_gait.simulation.mjcf import Bumps
         from nlp_gait.simulation.simulate import Conditions, Push
 
         slope = parse_numbers("a slope", self.slope_deg, "--slope-deg")
@@ -87,6 +85,7 @@ class ConditionOptions:
             stiffness_factor=self.stiffness_factor,
             slope_rad=(math.radians(slope[0]), math.radians(slope[1])),
             push=push,
+            bumps=None if self.bumps_mm is None else Bumps(height_m=1e-3 * self.bumps_mm),
         )
         return conditions if self.friction is None else replace(conditions, friction=self.friction)
 
@@ -162,7 +161,7 @@ def simulate(
     if folder is not None:
         written += [folder / name for name in ("report.json", "model.xml", "simulation.npz")]
         write_json(folder / "report.json", replace_nan(data))
-        write_text(folder / "model.xml", make_plan_model(plan, drive, sole, conditions.friction))
+        write_text(folder / "model.xml", make_plan_model(plan, drive, sole, conditions.friction, conditions.bumps))
         write_npz(folder / "simulation.npz", trace.signals(plan.joints))
         written += plot_simulation(plan, trace, drive, folder / "simulation")
     parts = [

@@ -1,10 +1,10 @@
-"""Balance feedback of planned walks: ZMP, footholds and times of steps by the divergent component of motion, whole-body torques."""
+"""Balance of planned walks: ZMP, footholds and times of steps by the divergent component of motion, whole-body torques."""
 
 import copy
 import math
 from collections import deque
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -65,7 +65,7 @@ class RobotState(NamedTuple):
     loads: Array  # (2,) normal forces on the feet [N]
 
 
-# Standard deviations of the root's place [m], attitude [rad], velocity [m/s] and rate [rad/s], of joint angles [rad] and rates [rad/s].
+# Standard deviations of the root's place [m], attitude [rad], velocity [m/s] and rate [rad/s], of joints' angles and rates.
 NOISE = {"place": 5e-4, "attitude": 1e-3, "velocity": 0.012, "rate": 0.01, "angle": 3e-4, "joint_rate": 0.02}
 EARLY = 0.6  # share of a swing after which a contact is a landing
 LANDING_SHARE = 0.85  # of a swing, at which the foot is above its foothold
@@ -173,7 +173,7 @@ class StepClock:
                 self.offsets[i] = feet[i] - planned[i]
 
     def aim(self, error: Array) -> None:
-        """Choose foothold and time of the swinging foot by the error (2,) of the divergent component from the standing foot [m]."""
+        """Choose foothold and time of the swing by the error (2,) of the divergent component from the standing foot [m]."""
         s, reference, phase = self._settings, self._reference, self.phase
         assert phase.swing is not None
         height, rate, stance = reference.height, reference.rate, 1 - phase.swing
@@ -259,6 +259,15 @@ class WholeBodyBalance:
         self.clock = StepClock(settings, self._reference)
         self._command: Array | None = None
 
+    def fork(self) -> Self:
+        """Return a copy for a simulation that begins in the middle of this one."""
+        other = copy.copy(self)
+        other._sensor, other.clock = copy.copy(self._sensor), copy.copy(self.clock)
+        other._sensor._random, other._sensor._waiting = copy.deepcopy((self._sensor._random, self._sensor._waiting))
+        clock = other.clock
+        clock.offsets, clock.goal, clock.origin = clock.offsets.copy(), clock.goal.copy(), clock.origin.copy()
+        return other
+
     def find_plan_time(self, time_s: float) -> float:
         """Return the time of the plan that the robot has reached, and the time since the plan's end [s]."""
         return self.clock.time_s + self.clock.ended_s
@@ -291,7 +300,11 @@ class WholeBodyBalance:
     def _collect_targets(self, data: Any, feet: Array, weight: float) -> Targets:
         """Return the accelerations and loads that lead back to the plan."""
         s, reference, clock = self._settings, self._reference, self.clock
-        rate, sample = reference.rate, lambda name: reference.sample(name, clock.time_s)
+        rate = reference.rate
+
+        def sample(name: str) -> Array:
+            return reference.sample(name, clock.time_s)
+
         com, velocity = data.subtree_com[0], data.subtree_linvel[0]
         dcm = com[:2] + velocity[:2] / rate
         if clock.phase.swing is not None:
@@ -329,11 +342,11 @@ class WholeBodyBalance:
     def _turn_torso(self, data: Any) -> Array:
         """Return the angular acceleration (3,) that leads the torso back to its planned attitude [rad/s^2]."""
         time, ahead, engine = self.clock.time_s, 0.01, self._engine
-        rotation, planned, soon = data.xmat[self._addresses.torso].reshape(3, 3), np.zeros(9), np.zeros(9)
-        for matrix, at_time in ((planned, time), (soon, time + ahead)):
+        rotation, matrices = data.xmat[self._addresses.torso].reshape(3, 3), np.zeros((2, 9))
+        for matrix, at_time in zip(matrices, (time, time + ahead), strict=True):
             quaternion = self._reference.sample("attitude", at_time)
             engine.mju_quat2Mat(matrix, quaternion / np.linalg.norm(quaternion))
-        planned, soon = planned.reshape(3, 3), soon.reshape(3, 3)
+        planned, soon = matrices.reshape(2, 3, 3)
         rate = to_rotation_vector(soon @ planned.T) / ahead * self.clock.rate
         error = to_rotation_vector(planned @ rotation.T)
         return _track(self._settings.torso_rate * self._reference.rate, error, rate - rotation @ data.qvel[3:6])

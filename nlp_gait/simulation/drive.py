@@ -2,10 +2,10 @@
 
 import math
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import read_text
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Joint
-from nlp_gait.simulation.engine import check_period
 from nlp_gait.simulation.balance import Balance, WholeBodyBalance
+from nlp_gait.simulation.engine import check_period
 from nlp_gait.simulation.feedback import BalanceController, Feedback
 from nlp_gait.simulation.joint_controller import GravityCompensation, JointController
 from nlp_gait.simulation.plan import Plan
@@ -31,6 +31,9 @@ FEED_FORWARD = ("torque", "velocity", "none")  # torque includes velocity
 
 class Corrector(Protocol):
     """Corrects the set-points of one simulation."""
+
+    def fork(self) -> Self:
+        """Return a copy for a simulation that begins in the middle of this one."""
 
     def find_plan_time(self, time_s: float) -> float:
         """Return the time of the plan that the robot follows at a time of the simulation [s]."""
@@ -160,8 +163,16 @@ def load_drive(name: str) -> Drive:
 
 # By name: as NAO's own controller, and set-points held for 40 ms, the sampling of the paper's gaits.
 DRIVES = {"feed-forward": Drive(), "held": Drive(period_s=0.04, interpolation="held", feed_forward="none")}
-FEEDBACKS: Mapping[str, Mapping[str, Feedback | Balance | None]] = {
-    "none": {"feedback": None, "balance": None},
-    "torso-spring": {"feedback": Feedback(), "balance": None},
-    "balance": {"feedback": None, "balance": Balance()},
-}
+FEEDBACKS = {"none": None, "torso-spring": Feedback(), "balance": Balance()}
+
+
+def set_feedback(drive: Drive, name: str) -> Drive:
+    """Return a drive with the feedback of a name in ``FEEDBACKS``; raises UnknownNameError."""
+    if name not in FEEDBACKS:
+        raise unknown("feedback", name, FEEDBACKS)
+    chosen = FEEDBACKS[name]
+    return replace(
+        drive,
+        feedback=chosen if isinstance(chosen, Feedback) else None,
+        balance=chosen if isinstance(chosen, Balance) else None,
+    )

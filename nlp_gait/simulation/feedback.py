@@ -1,9 +1,10 @@
 """Balance feedback: a virtual spring between the torso and its planned place, with sensor noise and delay."""
 
+import copy
 import math
 from collections import deque
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -114,6 +115,13 @@ class BalanceController:
         self._integral = np.zeros(6)  # force [N] and moment [Nm]
         weight, height = plan.robot.mass_kg * plan.gravity, plan.at("hip", np.zeros(1))[0, 2]
         self._most = feedback.growth_limit * weight * np.repeat([1.0, height], 3)
+
+    def fork(self) -> Self:
+        """Return a copy for a simulation that begins in the middle of this one."""
+        other = copy.copy(self)
+        other._sensor = copy.copy(self._sensor)
+        other._sensor._noise, other._sensor._waiting = copy.deepcopy((self._sensor._noise, self._sensor._waiting))
+        return other
 
     def find_plan_time(self, time_s: float) -> float:
         """Return the time of the plan at a time of the simulation: the same [s]."""

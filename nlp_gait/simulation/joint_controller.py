@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -43,6 +43,10 @@ class GravityCompensation:
         self._feet = [model.body(plan.robot.feet[side].link).id for side in SIDES]
         rates = self._addresses.rates
         self._root = np.setdiff1d(np.arange(model.nv), rates)
+
+    def fork(self) -> Self:
+        """Return itself: it has no memory."""
+        return self
 
     def find_plan_time(self, time_s: float) -> float:
         """Return the time of the plan at a time of the simulation: the same [s]."""

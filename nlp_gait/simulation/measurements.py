@@ -9,9 +9,10 @@ import numpy as np
 
 from nlp_gait.formulation import Array
 from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.engine import LEAST_LOAD
 from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.plan import ON_GROUND, SIDES, Plan
-from nlp_gait.simulation.simulate import LEAST_LOAD, Simulation
+from nlp_gait.simulation.simulate import Simulation
 
 AT_LIMIT = 1.0 - 1e-9  # share of a torque limit from which a drive counts as saturated
 SHORTEST_CONTACT = 0.003  # [s]; a shorter one is ignored

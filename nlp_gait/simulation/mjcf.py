@@ -1,18 +1,21 @@
 """Robots and their world in MJCF, MuJoCo's model format; needs no MuJoCo."""
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from typing import Literal
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from nlp_gait.errors import InputError
 from nlp_gait.formulation.display import Tread
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Link
 from nlp_gait.robots.tree import TreeBody, make_tree
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.plan import Plan
+from nlp_gait.simulation.plan import SIDES, Plan
 from nlp_gait.simulation.shapes import Prism, Shape, make_shapes
 from nlp_gait.symbolic.dynamics import tilt_gravity
 
@@ -33,7 +36,24 @@ PLANAR_JOINTS = {"root x": ("slide", "1 0 0"), "root z": ("slide", "0 0 1"), "ro
 Shapes = Mapping[str, Sequence[Shape]]
 
 
-def make_plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction: float = FRICTION) -> str:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bumps:
+    """Uneven ground: square tiles of random height along the walk."""
+
+    height_m: float  # heights are uniform from zero to this
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.height_m < math.inf:
+            raise InputError(f"height_m of bumps must be > 0, got {self.height_m!r}")
+
+
+TILE, TILE_MARGIN = 0.15, 0.5  # side of a tile, and ground around the planned soles that has tiles [height of the hip]
+
+
+def make_plan_model(
+    plan: Plan, drive: Drive, sole: str = "rectangle", friction: float = FRICTION, bumps: Bumps | None = None
+) -> str:
     """Return the model of a plan's robot with position drives on its ground, which all shapes can touch."""
     robot, shapes = plan.robot, make_plan_shapes(plan, sole)
     root = Xml.fromstring(files("nlp_gait.simulation").joinpath("world.xml").read_text(encoding="utf-8"))
@@ -51,6 +71,8 @@ def make_plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction:
                 corners = [value for z in levels for x, y in shape.outline for value in (x, y, z)]
                 Xml.SubElement(assets, "mesh", name=f"{link} {i}", vertex=_format_numbers(*corners))
     _add_stairs(world, plan.ground)
+    if bumps is not None:
+        _add_bumps(world, plan, bumps)
     bodies = add_bodies(world, make_tree(robot, robot.root), shapes, root="planar" if plan.planar else "free")
     _paint(bodies, robot)
     light = Xml.SubElement(bodies[robot.root], "light", mode="track", directional="true", pos="0.6 -0.8 1.5")
@@ -73,6 +95,24 @@ def make_plan_shapes(plan: Plan, sole: str) -> dict[str, list[Shape]]:
     """Return the shapes of a plan's robot by link; those of welded joints are parts of the parents."""
     welded = [joint for joint in plan.full_robot.joints if joint not in plan.robot.joints]
     return make_shapes(plan.full_robot, sole, welded)
+
+
+def _add_bumps(world: Xml.Element, plan: Plan, bumps: Bumps) -> None:
+    """Add tiles under the whole walk, except where the feet stand at its begin."""
+    samples, random = plan.signals.arrays, np.random.default_rng(bumps.seed)
+    hip = float(samples["hip"][0, 2])
+    feet = np.concatenate([samples[f"{side}_foot"][:, :2] for side in SIDES])
+    start = np.array([samples[f"{side}_foot"][0, :2] for side in SIDES])
+    size, margin = TILE * hip, TILE_MARGIN * hip
+    low, high = feet.min(axis=0) - margin, feet.max(axis=0) + margin
+    for i, x in enumerate(np.arange(low[0], high[0], size)):
+        for j, y in enumerate(np.arange(low[1], high[1], size)):
+            top = float(random.uniform(0.0, bumps.height_m))
+            if np.abs(start - (x, y)).max(axis=1).min() < margin / 2 + size:
+                continue
+            place = x, y, float(plan.level(np.array([x]))[0]) + top - size / 2
+            box = {"name": f"bump {i} {j}", "type": "box", "contype": "1", "material": "floor"}
+            Xml.SubElement(world, "geom", box, pos=_format_numbers(*place), size=_format_numbers(*np.full(3, size / 2)))
 
 
 def _add_stairs(world: Xml.Element, ground: Sequence[Tread]) -> None:

@@ -13,12 +13,12 @@ from nlp_gait.errors import OutputError
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import TRUNK, Limb, Skeleton, Sole, Tread
 from nlp_gait.interrupts import delay_interrupts
-from nlp_gait.simulation.engine import load_mujoco
+from nlp_gait.simulation.engine import LEAST_LOAD, load_mujoco
 from nlp_gait.simulation.measurements import average_pressure
 from nlp_gait.simulation.mjcf import TIME_STEP, find_sides, make_plan_shapes
 from nlp_gait.simulation.plan import SIDES, Plan
 from nlp_gait.simulation.shapes import Capsule
-from nlp_gait.simulation.simulate import LEAST_LOAD, Simulation
+from nlp_gait.simulation.simulate import Simulation
 from nlp_gait.simulation.video import Frame
 
 FRAMES_PER_S = 25.0

@@ -1,8 +1,9 @@
 """A gait in the engine: its simulation, and the disturbances that it survives."""
 
+import copy
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Columns, Signals, make_vector_columns
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import Addresses, load_mujoco, measure_pressure
-from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, make_plan_model
+from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, Bumps, make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
 
 LONGEST_WALK = 3  # simulated times the planned duration, where feedback delays the plan
@@ -57,6 +58,7 @@ class Conditions:
     # (x, y) slope of the floor, besides the plan's: positive rises forward or to the left
     slope_rad: tuple[float, float] = (0.0, 0.0)
     push: Push | None = None
+    bumps: Bumps | None = None
 
     def __post_init__(self) -> None:
         for name in ("friction", "mass_factor", "stiffness_factor"):
@@ -99,6 +101,90 @@ class Simulation:
         return Signals(joints=joints, arrays=arrays, columns=COLUMNS | driven)
 
 
+class Run:
+    """A simulation in progress."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        conditions: Conditions | None = None,
+        drive: Drive | None = None,
+        sole: str = "rectangle",
+    ) -> None:
+        """Begin at the planned state; raises MissingExtraError."""
+        self._engine, self._plan = load_mujoco(), plan
+        drive, self._conditions = drive or Drive(), conditions or Conditions()
+        self._model, self._data = prepare(plan, self._conditions, drive, sole)
+        self._addresses = Addresses(self._model, plan)
+        steps = round((plan.duration_s + SETTLE_TIME) / TIME_STEP)
+        times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
+        self._commands = drive.set_points(plan.at, times, [plan.robot.joint(name) for name in plan.joints])
+        heights, self._axes = plan.at("hip", times)[:, 2], plan.torso_axis(times)
+        self._least_heights = heights - (1.0 - FALLEN_HEIGHT) * heights[0]
+        self._corrector = drive.make_corrector(plan, prepare(plan, Conditions(), drive, sole)[0])
+        self._rows: list[tuple[Any, ...]] = []
+        self._step = 0
+        self.fell_at_s: float | None = None
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time [s]."""
+        return self._step * TIME_STEP
+
+    def advance(self, until_s: float = math.inf) -> bool:
+        """Simulate until a time, the end of the walk or a fall; return whether the robot is still up and on its way."""
+        while self.time_s < until_s:
+            time, corrector = self.time_s, self._corrector
+            plan_time = time if corrector is None else corrector.find_plan_time(time)
+            k = round(plan_time / TIME_STEP)
+            if (
+                self.fell_at_s is not None
+                or k >= len(self._commands)
+                or self._step >= LONGEST_WALK * len(self._commands)
+            ):
+                return False
+            command = self._commands[k] if corrector is None else corrector.correct(self._commands[k], self._data)
+            self._advance_engine(command, k, time, plan_time)
+        return self.fell_at_s is None
+
+    def _advance_engine(self, command: Array, k: int, time: float, plan_time: float) -> None:
+        data, addresses, push = self._data, self._addresses, self._conditions.push
+        data.ctrl[addresses.actuators] = command
+        if push is not None:
+            start = self._plan.duration_s / 2 if push.start_s is None else push.start_s
+            data.xfrc_applied[addresses.torso, :2] = push.force(time - start)
+        state, qd = data.qpos.copy(), data.qvel[addresses.rates]
+        self._engine.mj_step(
+            self._model, data
+        )  # leaves positions, forces and contacts of the instant at which it began
+        torso, axes = data.xpos[addresses.torso].copy(), data.xmat[addresses.torso]
+        upright, heading = float(axes[2::3] @ self._axes[k]), math.atan2(axes[3], axes[0])
+        feet, torque = data.site_xpos[addresses.soles], data.actuator_force[addresses.actuators]
+        measured = state, qd, torque, torso, upright, heading, feet, *measure_pressure(data, addresses)
+        self._rows.append((time, plan_time, np.array(command), *measured))
+        diverged = not np.isfinite(data.qvel).all()
+        if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < self._least_heights[k]:
+            self.fell_at_s = time
+        self._step += 1
+
+    def fork(self, push: Push) -> "Run":
+        """Return a copy that is pushed; its trace begins here."""
+        other = copy.copy(self)
+        other._data, other._rows = copy.copy(self._data), []
+        other._corrector = None if self._corrector is None else self._corrector.fork()
+        other._conditions = replace(self._conditions, push=push)
+        return other
+
+    def finish(self) -> Simulation:
+        """Simulate to the end and return the measurements."""
+        self.advance()
+        columns = (np.array(column, dtype=float) for column in zip(*self._rows, strict=True))
+        measured = dict(zip(("t", "plan_t", "set_points", "states", "qd", "torque", *COLUMNS), columns, strict=True))
+        measured["q"] = measured["states"][:, self._addresses.angles]
+        measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows have its cosine
+        return Simulation(**measured, fell_at_s=self.fell_at_s)
+
+
 def simulate_plan(
     plan: Plan,
     conditions: Conditions | None = None,
@@ -106,51 +192,13 @@ def simulate_plan(
     sole: str = "rectangle",
 ) -> Simulation:
     """Simulate a gait from its planned state until it has settled or fallen, deterministically; raises MissingExtraError."""
-    engine = load_mujoco()
-    drive, conditions = drive or Drive(), conditions or Conditions()
-    model, data = prepare(plan, conditions, drive, sole)
-    addresses = Addresses(model, plan)
-    times = TIME_STEP * np.arange(round((plan.duration_s + SETTLE_TIME) / TIME_STEP))
-    commands = drive.set_points(plan.at, times, [plan.robot.joint(name) for name in plan.joints])
-    heights, axes_planned = plan.at("hip", times)[:, 2], plan.torso_axis(times)
-    least_heights = heights - (1.0 - FALLEN_HEIGHT) * heights[0]
-    rows: list[tuple[Any, ...]] = []
-    fell_at_s = None
-    corrector = drive.make_corrector(plan, prepare(plan, Conditions(), drive, sole)[0])
-    push = conditions.push
-    pushed_s = plan.duration_s / 2 if push is None or push.start_s is None else push.start_s
-    for step in range(LONGEST_WALK * len(times)):
-        t = step * TIME_STEP
-        plan_time = t if corrector is None else corrector.find_plan_time(t)
-        k = round(plan_time / TIME_STEP)
-        if k >= len(times):
-            break
-        command = commands[k] if corrector is None else corrector.correct(commands[k], data)
-        data.ctrl[addresses.actuators] = command
-        if push is not None:
-            data.xfrc_applied[addresses.torso, :2] = push.force(t - pushed_s)
-        state, qd = data.qpos.copy(), data.qvel[addresses.rates]
-        engine.mj_step(model, data)  # leaves positions, forces and contacts of the instant at which it began
-        torso, axes = data.xpos[addresses.torso].copy(), data.xmat[addresses.torso]
-        upright, heading = float(axes[2::3] @ axes_planned[k]), math.atan2(axes[3], axes[0])
-        feet, torque = data.site_xpos[addresses.soles], data.actuator_force[addresses.actuators]
-        measured = state, qd, torque, torso, upright, heading, feet, *measure_pressure(data, addresses)
-        rows.append((t, plan_time, np.array(command), *measured))
-        diverged = not np.isfinite(data.qvel).all()
-        if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < least_heights[k]:
-            fell_at_s = t
-            break
-    columns = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
-    measured = dict(zip(("t", "plan_t", "set_points", "states", "qd", "torque", *COLUMNS), columns, strict=True))
-    measured["q"] = measured["states"][:, addresses.angles]
-    measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows have its cosine
-    return Simulation(**measured, fell_at_s=fell_at_s)
+    return Run(plan, conditions, drive, sole).finish()
 
 
 def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:
     """Return the engine's model and data, with the robot in its planned state at time zero."""
     engine = load_mujoco()
-    model = engine.MjModel.from_xml_string(make_plan_model(plan, drive, sole, conditions.friction))
+    model = engine.MjModel.from_xml_string(make_plan_model(plan, drive, sole, conditions.friction, conditions.bumps))
     model.body_mass *= conditions.mass_factor
     model.body_inertia *= conditions.mass_factor
     model.actuator_gainprm[:, 0] *= conditions.stiffness_factor

@@ -34,7 +34,8 @@ class WalkReference:
     def __init__(self, plan: Plan, model: Any, torque_limits: Array) -> None:
         self.plan, self.duration_s = plan, plan.duration_s
         self.mass = float(model.body_subtreemass[0])
-        times = STEP_S * np.arange(int(np.ceil(plan.duration_s / STEP_S)) + 2)
+        count = int(np.ceil(plan.duration_s / STEP_S)) + 2
+        times = np.linspace(0.0, count * STEP_S, count, endpoint=False)
         com = _follow_mass(plan, model, times)
         self.height = float(com[0, 2] - min(plan.at(f"{side}_foot", times[:1])[0, 2] for side in SIDES))
         self.rate = float(np.sqrt(plan.gravity / self.height))  # of the pendulum [1/s]
@@ -118,7 +119,7 @@ def _find_ankle_reach(plan: Plan, model: Any, torque_limits: Array) -> Array:
     return reach
 
 
-def _split(times: Array, stands: Array) -> list[Phase]:
+def _split(times: Array, stands: Any) -> list[Phase]:
     """Return the phases of a walk from the times (T,) at which the feet (T, 2) stand."""
     swing = np.where(stands.all(axis=1), -1, np.where(stands[:, 0], 1, 0))
     cuts = [0, *(np.flatnonzero(np.diff(swing)) + 1).tolist(), len(swing) - 1]

@@ -149,7 +149,7 @@ class WholeBodyQP:
 
     def _bound_wrenches(self, targets: Targets) -> tuple[Array, Array, Array]:
         """Return lower and upper bounds and kinds (12,) of the wrenches: zero for a foot in the air."""
-        low, high, kind = np.zeros(12), np.zeros(12), np.full(12, EQUAL, dtype=np.int32)
+        low, high, kind = np.zeros(12), np.zeros(12), np.full(12, float(EQUAL))
         for i, stands in enumerate(targets.stands):
             if stands:
                 wrench = slice(WRENCH * i, WRENCH * (i + 1))
