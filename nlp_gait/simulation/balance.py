@@ -45,9 +45,8 @@ class Balance:
     gap: float = 0.1  # between soles that pass each other [widths of the sole]
     load_rate: float = 6.0  # of a foot's load after touch-down and before lift-off [weight w]
     touch: float = 0.05  # load of a foot that has landed
-    stiffness: float = (
-        0.3  # of the drives, relative to the open loop's: torques are commanded, and damped between measurements
-    )
+    stiffness: float = 0.3  # of the drives, relative to the open loop's
+    hold: float = 1.0  # 1: drives hold planned angles and rates besides the torques of balance; 0: the present ones
 
     def __post_init__(self) -> None:
         for setting in fields(self):
@@ -78,8 +77,9 @@ CLOCK_FILTER, SLOWEST_CLOCK, FASTEST_CLOCK = 0.2, 0.3, 4.0
 class StateSensor:
     """Sensors of a whole robot in one simulation, with noise and delay."""
 
-    def __init__(self, settings: Balance, model: Any, addresses: Addresses) -> None:
-        self._settings, self._addresses, self._engine = settings, addresses, load_mujoco()
+    def __init__(self, settings: Balance, plan: Plan, model: Any) -> None:
+        self._settings, self._plan, self._engine = settings, plan, load_mujoco()
+        self._addresses: Addresses | None = None  # in the simulated model, whose ground may have more geometries
         self._every = max(1, round(settings.period_s / float(model.opt.timestep)))
         self._late = round(settings.delay_s / float(model.opt.timestep))
         self._random = np.random.default_rng(settings.seed)
@@ -95,6 +95,8 @@ class StateSensor:
         return self._waiting.popleft()[1] if arrived else None
 
     def _measure(self, data: Any) -> RobotState:
+        if self._addresses is None:
+            self._addresses = Addresses(data.model, self._plan)
         positions, velocities = data.qpos.copy(), data.qvel.copy()
         if self._settings.noise > 0.0:
             joints = len(positions) - 7
@@ -255,7 +257,7 @@ class WholeBodyBalance:
         self._addresses = Addresses(self._model, plan)
         self._reference = WalkReference(plan, self._model, torque_limits)
         self._qp = WholeBodyQP(self._reference, self._model, self._addresses, torque_limits, settings.friction)
-        self._sensor = StateSensor(settings, self._model, self._addresses)
+        self._sensor = StateSensor(settings, plan, self._model)
         self.clock = StepClock(settings, self._reference)
         self._command: Array | None = None
 
@@ -281,7 +283,7 @@ class WholeBodyBalance:
 
     def _update(self, state: RobotState) -> Array:
         """Return the set-points (J,) [rad] that give the torques of balance, damped towards the rates that these reach."""
-        data, engine, joints = self._data, self._engine, self._addresses
+        s, data, engine, joints = self._settings, self._data, self._engine, self._addresses
         data.qpos[:], data.qvel[:] = state.positions, state.velocities
         engine.mj_fwdPosition(self._model, data)
         engine.mj_fwdVelocity(self._model, data)
@@ -293,9 +295,10 @@ class WholeBodyBalance:
         q, qd = data.qpos[joints.angles], data.qvel[joints.rates]
         if solution is None:
             return q.copy() if self._command is None else self._command
-        torque, acceleration = solution
-        soon = qd + acceleration * self._settings.period_s
-        return np.asarray(q + (torque + self._damping * soon) / self._stiffness)
+        soon = qd + solution.accelerations * s.period_s
+        planned, rate = (self._reference.sample(name, self.clock.time_s) for name in ("q", "qd"))
+        held, held_rate = q + s.hold * (planned - q), soon + s.hold * (self.clock.rate * rate - soon)
+        return np.asarray(held + (solution.torques + self._damping * held_rate) / self._stiffness)
 
     def _collect_targets(self, data: Any, feet: Array, weight: float) -> Targets:
         """Return the accelerations and loads that lead back to the plan."""

@@ -131,6 +131,11 @@ class Run:
         """Simulated time [s]."""
         return self._step * TIME_STEP
 
+    @property
+    def positions(self) -> Array:
+        """Present coordinates (Q,) of the robot, as in ``Simulation.states``."""
+        return np.array(self._data.qpos)
+
     def advance(self, until_s: float = math.inf) -> bool:
         """Simulate until a time, the end of the walk or a fall; return whether the robot is still up and on its way."""
         while self.time_s < until_s:

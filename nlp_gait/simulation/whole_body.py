@@ -1,7 +1,7 @@
 """Whole-body control: joint torques whose accelerations and contact forces are nearest to what balance asks for."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,6 +42,14 @@ class Targets:
     most_load: tuple[float, float]  #: largest normal forces [N]
 
 
+class Torques(NamedTuple):
+    """Solution of one instant."""
+
+    torques: Array  # (J,) of the joints [Nm]
+    accelerations: Array  # (J,) of the joints [rad/s^2]
+    wrenches: Array  # (12,) force [N] and moment [Nm] on each sole, in its axes
+
+
 class WholeBodyQP:
     """Quadratic program of one robot in accelerations and contact wrenches; torque limits are hard.
 
@@ -74,8 +82,8 @@ class WholeBodyQP:
         self._cone = _make_cone(reference.soles, friction)
         self.failures = 0
 
-    def solve(self, data: Any, targets: Targets) -> tuple[Array, Array] | None:
-        """Return joint torques (J,) [Nm] and accelerations (J,) [rad/s^2], None where DAQP finds no solution.
+    def solve(self, data: Any, targets: Targets) -> Torques | None:
+        """Return the torques of least cost, None where DAQP finds no solution.
 
         ``data`` has the measured positions and velocities, with positions and velocities computed.
         """
@@ -107,7 +115,8 @@ class WholeBodyQP:
             self.failures += 1
             return None
         acceleration[free] = x[:count]
-        return np.clip((motion @ x + rest)[joints], -self._limits, self._limits), acceleration[joints]
+        torques = np.clip((motion @ x + rest)[joints], -self._limits, self._limits)
+        return Torques(torques, acceleration[joints], x[count:])
 
     def _differentiate_soles(self, data: Any) -> tuple[Array, Array]:
         """Return the soles' Jacobians (2, 6, V), and their accelerations (2, 6) at constant velocities."""

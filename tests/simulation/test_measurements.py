@@ -64,6 +64,7 @@ def traced(**changed):
     loads = np.where(landed[:, None], [30.0, 20.0], [50.0, 0.0])
     fields = {
         "t": t,
+        "plan_t": t,
         "states": np.zeros((len(t), 0)),
         "q": np.stack([0.5 * during + 0.01, 0.0 * t], axis=1),
         "qd": still(t, [0.5, 0.2]),
