@@ -47,12 +47,12 @@ class DriveOptions:
 
     def make(self) -> Drive:
         """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
-        from nlp_gait.simulation.drive import load_drive, set_feedback
+        from nlp_gait.simulation.drive import load_drive, choose_feedback
 
         drive = load_drive(self.drive)
         if self.torque_limits is not None:
             drive = replace(drive, torque_limits=self.torque_limits)
-        return drive if self.feedback is None else set_feedback(drive, self.feedback)
+        return drive if self.feedback is None else choose_feedback(drive, self.feedback)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from nlp_gait.simulation.engine import Addresses, check_period, load_mujoco, mea
 from nlp_gait.simulation.feedback import to_rotation_vector
 from nlp_gait.simulation.footholds import StepLimits, choose_step, clip_to_soles
 from nlp_gait.simulation.plan import Plan
-from nlp_gait.simulation.walk_reference import Phase, WalkReference
+from nlp_gait.simulation.walk_reference import SupportPhase, WalkReference
 from nlp_gait.simulation.whole_body import Targets, WholeBodyQP
 
 
@@ -126,17 +126,17 @@ class StepClock:
         self.lowered_m = 0.0  # by a foot that searches the ground
 
     @property
-    def phase(self) -> Phase:
+    def phase(self) -> SupportPhase:
         """The present phase."""
         return self._reference.phases[self._number]
 
     @property
-    def before(self) -> Phase | None:
+    def before(self) -> SupportPhase | None:
         """The phase before it."""
         return self._reference.phases[self._number - 1] if self._number else None
 
     @property
-    def after(self) -> Phase | None:
+    def after(self) -> SupportPhase | None:
         """The phase after it."""
         rest = self._reference.phases[self._number + 1 :]
         return rest[0] if rest else None
@@ -160,7 +160,7 @@ class StepClock:
         else:
             done = (time - phase.start_s) / (phase.end_s - phase.start_s)
             touches = bool(loads[phase.swing] > settings.touch)
-            self.touched = self.touched or (touches and done > EARLY)  # early: it stands, and the clock goes on
+            self.touched = self.touched or (touches and done > EARLY)  # early: it stands, and the clock continues
             if time >= phase.end_s and (self.touched or touches or self.lowered_m > DEEPEST * reference.height):
                 self._number += 1 if self.after is not None else 0
                 self.rate, self.touched = 1.0, False

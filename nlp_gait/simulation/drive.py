@@ -166,7 +166,7 @@ DRIVES = {"feed-forward": Drive(), "held": Drive(period_s=0.04, interpolation="h
 FEEDBACKS = {"none": None, "torso-spring": Feedback(), "balance": Balance()}
 
 
-def set_feedback(drive: Drive, name: str) -> Drive:
+def choose_feedback(drive: Drive, name: str) -> Drive:
     """Return a drive with the feedback of a name in ``FEEDBACKS``; raises UnknownNameError."""
     if name not in FEEDBACKS:
         raise unknown("feedback", name, FEEDBACKS)

@@ -20,6 +20,7 @@ SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot t
 FALLEN_TILT = math.radians(45.0)
 FALLEN_HEIGHT = 0.6  # of the torso's planned height at the start; sinking by the rest below the plan is a fall
 COLUMNS = {
+    "plan_t": Columns(unit="s"),
     "torso": make_vector_columns("m"),
     "tilt": Columns(unit="rad"),
     "heading": Columns(unit="rad"),
@@ -96,7 +97,7 @@ class Simulation:
 
     def signals(self, joints: tuple[str, ...]) -> Signals:
         """Return the time histories, for an archive."""
-        arrays = {name: getattr(self, name) for name in ("t", "plan_t", "q", "qd", "torque", "set_points", *COLUMNS)}
+        arrays = {name: getattr(self, name) for name in ("t", "q", "qd", "torque", "set_points", *COLUMNS)}
         driven = {"torque": Columns(unit="Nm", labels=joints), "set_points": Columns(unit="rad", labels=joints)}
         return Signals(joints=joints, arrays=arrays, columns=COLUMNS | driven)
 
@@ -165,8 +166,8 @@ class Run:
         torso, axes = data.xpos[addresses.torso].copy(), data.xmat[addresses.torso]
         upright, heading = float(axes[2::3] @ self._axes[k]), math.atan2(axes[3], axes[0])
         feet, torque = data.site_xpos[addresses.soles], data.actuator_force[addresses.actuators]
-        measured = state, qd, torque, torso, upright, heading, feet, *measure_pressure(data, addresses)
-        self._rows.append((time, plan_time, np.array(command), *measured))
+        measured = torso, upright, heading, feet, *measure_pressure(data, addresses)
+        self._rows.append((time, np.array(command), state, qd, torque, plan_time, *measured))
         diverged = not np.isfinite(data.qvel).all()
         if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < self._least_heights[k]:
             self.fell_at_s = time
@@ -184,7 +185,7 @@ class Run:
         """Simulate to the end and return the measurements."""
         self.advance()
         columns = (np.array(column, dtype=float) for column in zip(*self._rows, strict=True))
-        measured = dict(zip(("t", "plan_t", "set_points", "states", "qd", "torque", *COLUMNS), columns, strict=True))
+        measured = dict(zip(("t", "set_points", "states", "qd", "torque", *COLUMNS), columns, strict=True))
         measured["q"] = measured["states"][:, self._addresses.angles]
         measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows have its cosine
         return Simulation(**measured, fell_at_s=self.fell_at_s)

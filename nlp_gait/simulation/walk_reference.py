@@ -15,7 +15,7 @@ SMOOTHING = 11  # samples over which the accelerations of the centre of mass are
 
 
 @dataclass(frozen=True, slots=True)
-class Phase:
+class SupportPhase:
     """Double support, or single support with the number of the swinging foot in ``SIDES``."""
 
     start_s: float
@@ -119,17 +119,17 @@ def _find_ankle_reach(plan: Plan, model: Any, torque_limits: Array) -> Array:
     return reach
 
 
-def _split(times: Array, stands: Any) -> list[Phase]:
+def _split(times: Array, stands: Any) -> list[SupportPhase]:
     """Return the phases of a walk from the times (T,) at which the feet (T, 2) stand."""
     swing = np.where(stands.all(axis=1), -1, np.where(stands[:, 0], 1, 0))
     cuts = [0, *(np.flatnonzero(np.diff(swing)) + 1).tolist(), len(swing) - 1]
     return [
-        Phase(float(times[a]), float(times[b]), None if swing[a] < 0 else int(swing[a]))
+        SupportPhase(float(times[a]), float(times[b]), None if swing[a] < 0 else int(swing[a]))
         for a, b in zip(cuts[:-1], cuts[1:], strict=True)
     ]
 
 
-def _integrate_carry(phases: list[Phase], load_left: Array, rate: float) -> Array:
+def _integrate_carry(phases: list[SupportPhase], load_left: Array, rate: float) -> Array:
     """Return the share w (T,) of the landing foot's offset in the offset of the divergent component: w' = rate (w - its load).
 
     It is integrated backward from 1 at the end of each double support; in the swing before, the foot bears no load.
