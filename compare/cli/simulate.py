@@ -15,14 +15,14 @@ from compare.analysis.units import format_millimetres, with_unit
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
 from compare.cli.options import StoredGait, parse_numbers
 from compare.cli.printing import Output, Rows, show_progress
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, MissingExtraError, OutputError
 from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
 from nlp_gait.simulation.video import Frame, check_frames, check_video_path, write_video
 
 if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.measurements import ClimbMeasurements, Measurements, Walk
-    from nlp_gait.simulation.simulate import Conditions, Robustness
+    from nlp_gait.simulation.simulate import Conditions, Push, Robustness, Run
 
 DRIVE = (
     "feed-forward: set-points every 10 ms, linear between them, planned velocity and torque fed forward. held: each held for "
@@ -34,6 +34,7 @@ FEEDBACK = (
     "torso-spring: balance by measured place and attitude of the torso."
 )
 SLOPE = "Rise of the floor forward and to the left, added to the slope of a walk planned for one."
+LIVE = "Show it in MuJoCo's viewer in real time; arrow keys push the robot forward, backward, to the left and to the right."
 PUSH = "Impulse on the torso, forward and to the left [N s], and its begin [s] (default: in the middle)."
 
 
@@ -47,7 +48,7 @@ class DriveOptions:
 
     def make(self) -> Drive:
         """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
-        from nlp_gait.simulation.drive import load_drive, choose_feedback
+        from nlp_gait.simulation.drive import choose_feedback, load_drive
 
         drive = load_drive(self.drive)
         if self.torque_limits is not None:
@@ -104,6 +105,7 @@ def simulate(
         Option(help="Film it to this .gif file; needs OpenGL."),
         OUTPUT_FILE,
     ] = None,
+    live: Annotated[bool, Option("--live", help=LIVE)] = False,
     sole: Annotated[str, Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     world: ConditionOptions,
     drive_options: DriveOptions,
@@ -131,7 +133,7 @@ def simulate(
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
     from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, list_frames, make_skeleton
-    from nlp_gait.simulation.simulate import SETTLE_TIME, measure_robustness, prepare, simulate_plan
+    from nlp_gait.simulation.simulate import SETTLE_TIME, Run, measure_robustness, prepare
 
     load_mujoco(pictures=video is not None)
     if video is not None:
@@ -141,7 +143,9 @@ def simulate(
     plan = make_plan(result, steps)
     if video is not None:
         check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
-    trace = simulate_plan(plan, conditions, drive, sole)
+    simulation = Run(plan, conditions, drive, sole)
+    pushes, failures = _watch(simulation) if live else ([], [])
+    trace = simulation.finish()
     written = [path for path in (page, video) if path is not None]
     model, _ = prepare(plan, conditions, drive, sole)
     if page is not None:
@@ -151,7 +155,7 @@ def simulate(
         write_video(video, _show_pictures(draw_pictures(plan, trace, model), len(list_frames(trace))), FRAMES_PER_S)
     walk = None if plan.steps is None else measure_walk(plan, trace, drive, plan.steps)
     report = measure(plan, trace, drive) if walk is None else walk.measurements
-    data = {"schema": 1, **asdict(report)}
+    data = {"schema": 1, **asdict(report), "pushes": [asdict(push) for push in pushes]}
     if walk is not None:
         data |= {"walked_m": walk.walked_m, "planned_m": walk.planned_m, "energy_J": walk.engine_J}
         data["walk"] = walk.course()
@@ -181,7 +185,22 @@ def simulate(
         except KeyboardInterrupt:
             where = "printed" if folder is None else f"stored in {folder}"
             interrupted = f"interrupted in the tests of robustness; the simulation is {where}"
-    return Output(data=data, parts=parts, written=written, interrupted=interrupted)
+    return Output(data=data, parts=parts, written=written, failures=failures, interrupted=interrupted)
+
+
+def _watch(simulation: Run) -> tuple[list[Push], list[str]]:
+    """Show a simulation; return the pushes of the arrow keys, and why there is no window: it is recorded without one."""
+    from nlp_gait.simulation.live import watch
+
+    try:
+        return watch(simulation), []
+    except (OutputError, MissingExtraError) as error:
+        return [], [f"{error}; it was simulated without one"]
+
+
+def _describe_push(push: Push) -> str:
+    x, y = push.impulse_Ns
+    return f"Pushed at {push.start_s:.2f} s by {x:z.2f} N s forward and {y:z.2f} N s to the left"
 
 
 def _show_pictures(pictures: Iterator[Frame], count: int) -> Iterator[Frame]:

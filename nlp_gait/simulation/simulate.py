@@ -113,10 +113,10 @@ class Run:
         sole: str = "rectangle",
     ) -> None:
         """Begin at the planned state; raises MissingExtraError."""
-        self._engine, self._plan = load_mujoco(), plan
+        self._engine, self.plan = load_mujoco(), plan
         drive, self._conditions = drive or Drive(), conditions or Conditions()
-        self._model, self._data = prepare(plan, self._conditions, drive, sole)
-        self._addresses = Addresses(self._model, plan)
+        self.model, self.data = prepare(plan, self._conditions, drive, sole)
+        self._addresses = Addresses(self.model, plan)
         steps = round((plan.duration_s + SETTLE_TIME) / TIME_STEP)
         times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
         self._commands = drive.set_points(plan.at, times, [plan.robot.joint(name) for name in plan.joints])
@@ -135,7 +135,7 @@ class Run:
     @property
     def positions(self) -> Array:
         """Present coordinates (Q,) of the robot, as in ``Simulation.states``."""
-        return np.array(self._data.qpos)
+        return np.array(self.data.qpos)
 
     def advance(self, until_s: float = math.inf) -> bool:
         """Simulate until a time, the end of the walk or a fall; return whether the robot is still up and on its way."""
@@ -149,20 +149,18 @@ class Run:
                 or self._step >= LONGEST_WALK * len(self._commands)
             ):
                 return False
-            command = self._commands[k] if corrector is None else corrector.correct(self._commands[k], self._data)
+            command = self._commands[k] if corrector is None else corrector.correct(self._commands[k], self.data)
             self._advance_engine(command, k, time, plan_time)
         return self.fell_at_s is None
 
     def _advance_engine(self, command: Array, k: int, time: float, plan_time: float) -> None:
-        data, addresses, push = self._data, self._addresses, self._conditions.push
+        data, addresses, push = self.data, self._addresses, self._conditions.push
         data.ctrl[addresses.actuators] = command
         if push is not None:
-            start = self._plan.duration_s / 2 if push.start_s is None else push.start_s
+            start = self.plan.duration_s / 2 if push.start_s is None else push.start_s
             data.xfrc_applied[addresses.torso, :2] = push.force(time - start)
         state, qd = data.qpos.copy(), data.qvel[addresses.rates]
-        self._engine.mj_step(
-            self._model, data
-        )  # leaves positions, forces and contacts of the instant at which it began
+        self._engine.mj_step(self.model, data)  # leaves positions, forces and contacts of the instant at which it began
         torso, axes = data.xpos[addresses.torso].copy(), data.xmat[addresses.torso]
         upright, heading = float(axes[2::3] @ self._axes[k]), math.atan2(axes[3], axes[0])
         feet, torque = data.site_xpos[addresses.soles], data.actuator_force[addresses.actuators]
@@ -173,12 +171,16 @@ class Run:
             self.fell_at_s = time
         self._step += 1
 
+    def push(self, push: Push) -> None:
+        """Push the robot from now on by this push instead of an earlier one."""
+        self._conditions = replace(self._conditions, push=push)
+
     def fork(self, push: Push) -> "Run":
         """Return a copy that is pushed; its trace begins here."""
         other = copy.copy(self)
-        other._data, other._rows = copy.copy(self._data), []
+        other.data, other._rows = copy.copy(self.data), []
         other._corrector = None if self._corrector is None else self._corrector.fork()
-        other._conditions = replace(self._conditions, push=push)
+        other.push(push)
         return other
 
     def finish(self) -> Simulation:
