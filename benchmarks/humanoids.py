@@ -1,207 +1,319 @@
-"""Public humanoids side by side: ten starts, searches, and steps and cycles at one Froude number, model and engine.
+"""Every public humanoid of the packages that we know, planned, simulated and pushed, with and without feedback.
 
-    python -m benchmarks.humanoids [starts] [searches] [steps] [cycles] [--robots jvrc,g1,...]
+    python -m benchmarks.humanoids FOLDER [--robots NAME,...] [--margins X,Y]    # a JSON file per robot; what exists is kept
+    python -m benchmarks.humanoids FOLDER --table walks | python -m docs.pages.numbers zoo-walks
+    python -m benchmarks.humanoids FOLDER --table others | python -m docs.pages.numbers zoo-others
+    python -m benchmarks.humanoids FOLDER FOLDER... --table margins | python -m docs.pages.numbers margins
 
-Robots come from the packages ``jvrc-description`` and ``example-robot-data``; what is not installed is left out and said.
+The last table takes a folder for each choice of margins. ``mujoco-menagerie`` downloads its robots,
+or reads a copy below ``MENAGERIE_ROOT``.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Callable, Iterator
-from importlib.util import find_spec
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from time import perf_counter
+from typing import Any
 
 import numpy as np
 
-import metaheuristics
 import nlp_gait
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.nlp import build_nlp
-from nlp_gait.formulation import GaitProblem, Result
-from nlp_gait.gaits.humanoid.body import GRAVITY
-from nlp_gait.robots.biped import NAO_LEG_M, make_biped_model
+from nlp_gait.backends.plan_walk import MARGINS, WalkSettings
+from nlp_gait.errors import GaitError
+from nlp_gait.formulation import load_result
+from nlp_gait.simulation.drive import Drive, choose_feedback
+from nlp_gait.simulation.measurements import measure_walk
+from nlp_gait.simulation.plan import Plan, make_plan
+from nlp_gait.simulation.simulate import DIRECTIONS, Push, Run, simulate_plan
 
-SHARE = "share/example-robot-data/robots"
-STARTS, STEPS = 10, 4
-SEARCHES = {name: metaheuristics.make_algorithm(name) for name in ("pso", "ga", "aco")}
-TIME_S = 2.0  # of NAO's single support
+Row = dict[str, Any]
+
+# Humanoids by package; a name stands for all files with the same legs, soles and masses.
+ROBOTS: Mapping[str, tuple[str, ...]] = {
+    "": ("nao-v4", "nao-v5", "nao-v6"),
+    "jvrc-description": ("jvrc1",),
+    "example-robot-data": (
+        "g1_29dof_rev_1_0",
+        "talos_reduced",
+        "talos_full_v2",
+        "romeo",
+        "icub",
+        "alexander_v1.lowerBodyOnly",
+        "alex_nub_hands",
+        "simple_humanoid",
+        "romeo_laas_small",
+        "bolt",
+        "human",
+    ),
+    "icub-models": (
+        "iCubGazeboV2_5",
+        "iCubGazeboV2_7",
+        "iCubGenova01",
+        "iCubGenova02",
+        "iCubGenova03",
+        "iCubGenova04",
+        "iCubGenova11",
+        "iCubNancy01",
+    ),
+    "menagerie": (
+        "unitree_g1",
+        "booster_t1",
+        "apptronik_apollo",
+        "robotis_op3",
+        "unitree_h1",
+        "berkeley_humanoid",
+        "fourier_n1",
+        "pal_talos",
+        "pndbotics_adam_lite",
+        "toddlerbot_2xc",
+        "toddlerbot_2xm",
+    ),
+    "fourier-robot-descriptions": (
+        "urdf/gr1t1",
+        "urdf/gr1t2",
+        "urdf/gr2t2",
+        "urdf/gr2t2v2",
+        "urdf/gr3",
+        "urdf/qinglong",
+    ),
+    "armar": ("armar4", "armar6"),
+    "mjlab": ("g1",),
+}
+STEPS = 10
+FEEDBACKS = ("none", "balance")
+LEVELS, LARGEST_SHARE = 32, 0.5  # of the bisection, and its largest impulse, of mass sqrt(gravity height)
+PUSH_S = 0.1
+SETTLE = 10.0  # pendulum's times after a push, within which a robot that has lost its balance falls
+NO_PUSH = Push(impulse_Ns=(0.0, 0.0))
 
 
-def robots() -> dict[str, str]:
-    """Files by name; NAO is a general leg here."""
-    found = {"nao": "nao-v5"}
-    jvrc = find_spec("jvrc_description")
-    if jvrc is not None and jvrc.origin is not None:
-        found["jvrc"] = str(Path(jvrc.origin).parent / "urdf/jvrc1.urdf")
-    for folder in sys.path:
-        root = Path(folder) / "cmeel.prefix" / SHARE
-        if root.is_dir():
-            found["g1"] = str(root / "g1_description/urdf/g1_29dof_rev_1_0.urdf")
-            found["talos"] = str(root / "talos_data/robots/talos_full_v2.urdf")
-            found["romeo"] = str(root / "romeo_description/urdf/romeo.urdf")
-            break
-    for name in ("jvrc", "g1", "talos", "romeo"):
-        if name not in found:
-            print(f"{name} is left out: pip install jvrc-description example-robot-data", file=sys.stderr)
+def list_names() -> list[str]:
+    """Return the names of all robots, as ``--robot`` takes them."""
+    return [f"{package}:{name}" if package else name for package, names in ROBOTS.items() for name in names]
+
+
+def plan(name: str, folder: Path, row: Row) -> Row:
+    """Plan ten steps at the cheapest speed; returns numbers, or why there is no plan."""
+    begin = perf_counter()
+    try:
+        walk = nlp_gait.plan_walk(name, STEPS, settings=WalkSettings(margins=row["margins"]))
+    except GaitError as error:
+        reason = "not run" if "does not provide" in str(error) or "not installed" in str(error) else "refused"
+        return {reason: str(error)}
+    if not walk.feasible:
+        return {"infeasible": list(walk.obstacles), "planning_s": perf_counter() - begin}
+    walk.save(find_plan(folder, name))
+    problem, robot = walk.solution.problem, walk.solution.problem.display.robot
+    assert robot is not None
+    indexes = build_exact_model(problem).at(walk.solution.best.x, problem.p).indexes
+    return {
+        "robot": robot.name,
+        "mass_kg": robot.mass_kg,
+        "energy_J_per_m": walk.energy_J / walk.distance_m,
+        "speed_m_s": float(indexes["speed_m_s"]),
+        "distance_m": walk.distance_m,
+        "margins_m": [float(indexes[f"ssp_dbm_{axis}_min_m"]) for axis in "xy"],
+        "active_margins": list(walk.active_margins),
+        "planning_s": perf_counter() - begin,
+    }
+
+
+def find_plan(folder: Path, name: str) -> Path:
+    """Return the file of a robot's plan."""
+    return folder / "plans" / f"{name.replace(':', '_').replace('/', '_')}.json"
+
+
+def walk(name: str, folder: Path, row: Row) -> Row:
+    """Simulate the plan with each feedback; returns the share of the planned distance, or when the robot fell [s]."""
+    plan = make_plan(load_result(find_plan(folder, name)))
+    walked: Row = {}
+    for feedback in FEEDBACKS:
+        drive = choose_feedback(Drive(), feedback)
+        trace = simulate_plan(plan, drive=drive)
+        measured = measure_walk(plan, trace, drive, STEPS)
+        share = None if measured.walked_m is None else measured.walked_m / row["plan"]["distance_m"]
+        walked[feedback] = {"walked": share, "fell_at_s": trace.fell_at_s}
+    return walked
+
+
+def push(name: str, folder: Path, row: Row) -> Row:
+    """Return the largest impulse on the torso that the robot survives in each direction at both instants [N s]."""
+    plan = make_plan(load_result(find_plan(folder, name)))
+    unit = plan.robot.mass_kg * math.sqrt(plan.gravity * plan.at("hip", np.zeros(1))[0, 2])
+    return {
+        feedback: find_pushes(plan, choose_feedback(Drive(), feedback), unit)
+        for feedback in FEEDBACKS
+        if row["walk"][feedback]["fell_at_s"] is None
+    }
+
+
+def find_pushes(plan: Plan, drive: Drive, unit_Ns: float) -> dict[str, float]:
+    """Bisect the impulse of pushes in the middle of two successive swings of the inner steps, by direction [N s]."""
+    run, forks = Run(plan, None, drive), []
+    for begin, end in list_swings(plan)[3:5]:
+        run.advance((begin + end) / 2)
+        forks.append(run)
+        run = run.fork(NO_PUSH)
+    settle_s = SETTLE / math.sqrt(plan.gravity / plan.at("hip", np.zeros(1))[0, 2])
+    found = {}
+    for direction, (x, y) in DIRECTIONS.items():
+        low, high = 0, LEVELS
+        while high - low > 1:
+            middle = (low + high) // 2
+            impulse = LARGEST_SHARE * unit_Ns * middle / LEVELS
+            if all(survives(fork, (x * impulse, y * impulse), settle_s) for fork in forks):
+                low = middle
+            else:
+                high = middle
+        found[direction] = LARGEST_SHARE * unit_Ns * low / LEVELS
     return found
 
 
-def starts(files: dict[str, str]) -> Iterator[str]:
-    """Single support from random starts: how many end feasible, closure, and the lifted objective against the exact one."""
-    from casadi import Function
-
-    yield header("robot", "feasible", "iterations", "best W", "closure m", "lifted against exact", "binding")
-    for name, file in files.items():
-        problem = nlp_gait.load("humanoid-ssp", robot=file)
-        solution = nlp_gait.solve(problem, starts=STARTS, seed=0)
-        x, model, nlp = np.array(list(solution.x.values())), build_exact_model(problem), build_nlp(problem)
-        values = model.at(x, problem.p)
-        rows = [i for i, row in enumerate(model.row_names) if row.startswith("closure")]
-        width = nlp.widths[-1]
-        cost = Function("cost", [nlp.nlp["x"], nlp.nlp["p"]], [nlp.nlp["f"]])
-        lifted = float(cost(nlp.start(problem, x, width), np.append(problem.p, width)))
-        yield cells(
-            name,
-            f"{sum(start.converged for start in solution.starts)} of {STARTS}",
-            f"{np.median([start.iterations for start in solution.starts]):.0f}",
-            f"{solution.objective:.6g}",
-            f"{values.g[rows].max():.1e}",
-            f"{abs(lifted - values.cost) / values.cost:.1e}",
-            ", ".join(active.name for active in solution.active_constraints[:4]),
-        )
+def survives(run: Run, impulse_Ns: tuple[float, float], settle_s: float) -> bool:
+    """Return whether a robot that is pushed now is up some time later."""
+    pushed = run.fork(Push(impulse_Ns=impulse_Ns, start_s=run.time_s, duration_s=PUSH_S))
+    pushed.advance(run.time_s + settle_s)
+    return pushed.fell_at_s is None
 
 
-def searches(files: dict[str, str]) -> Iterator[str]:
-    """Searches of 40,000 evaluations, five seeds each: how many end feasible, and the best over IPOPT's best."""
-    yield header("robot", "IPOPT W", *(f"{name}: feasible, best - IPOPT, median" for name in SEARCHES))
-    for name, file in files.items():
-        problem = nlp_gait.load("humanoid-ssp", robot=file)
-        best = nlp_gait.solve(problem, starts=4, seed=0).objective
-        objective = nlp_gait.compile_objective(problem, threads=1)
-        found = []
-        for search in SEARCHES.values():
-            runs = [metaheuristics.minimize(objective, search, evaluations=40_000, seed=seed) for seed in range(5)]
-            feasible = [run.objective for run in runs if run.feasible]
-            least, middle = (min(feasible), float(np.median(feasible))) if feasible else (np.nan, np.nan)
-            found.append(f"{len(feasible)} of {len(runs)}, {(least - best) / best:+.1e}, {(middle - best) / best:+.1e}")
-        yield cells(name, f"{best:.6g}", *found)
+def list_swings(plan: Plan) -> list[tuple[float, float]]:
+    """Return begin and end of the swings of the feet, in the order of time [s]."""
+    times = np.arange(0.0, plan.duration_s, 0.002)
+    single = np.logical_xor(plan.stands("left", times), plan.stands("right", times)).astype(int)
+    begins, ends = (np.flatnonzero(np.diff(single) == sign) for sign in (1, -1))
+    return list(zip(times[begins], times[ends], strict=True))
 
 
-def steps(files: dict[str, str]) -> Iterator[str]:
-    """Cheapest single supports of NAO's 2 s times the root of lambda, in the model and played: equal Froude numbers."""
-    from nlp_gait.simulation.drive import Drive
-    from nlp_gait.simulation.measurements import measure
-    from nlp_gait.simulation.plan import make_plan
-    from nlp_gait.simulation.simulate import simulate_plan
-
-    yield header("robot", "leg m", "mass kg", "time s", "step m", "power W", "CoT", "margins mm", "binding", "engine")
-    for name, file in files.items():
-        problem = nlp_gait.load("humanoid-ssp", robot=file)
-        robot, leg = problem.display.robot, leg_of(problem)
-        assert robot is not None
-        time_s = TIME_S * float(np.sqrt(leg / NAO_LEG_M))
-        problem = problem.fix(single_support_time_s=time_s)
-        solution = nlp_gait.solve(problem, starts=2, seed=0)
-        x = np.array(list(solution.x.values()))
-        indexes, hip = build_exact_model(problem).at(x, problem.p).indexes, problem.signals(x).arrays["left_foot"]
-        plan = make_plan(Result(problem=problem, x=x))
-        m = measure(plan, simulate_plan(plan), Drive())
-        fate = f"falls at {m.fell_at_s:.1f} s" if m.fallen else f"upright, tilt {m.largest_tilt_deg:.1f} deg"
-        step = float(hip[0, 0])
-        yield cells(
-            name,
-            f"{leg:.3f}",
-            f"{robot.mass_kg:.1f}",
-            f"{time_s:.2f}",
-            f"{step:.3f}",
-            f"{indexes['power_W']:.3f}" if solution.converged else "not feasible",
-            f"{indexes['power_W'] * time_s / (robot.mass_kg * GRAVITY * step):.3f}",
-            ", ".join(f"{1e3 * indexes[f'dbm_{axis}_min_m']:.0f}" for axis in "xy"),
-            ", ".join(active.name for active in solution.active_constraints[:3]),
-            f"{fate}, {m.measured.total_W:.3f} W",
-        )
+STAGES: Mapping[str, Callable[[str, Path, Row], Row]] = {"plan": plan, "walk": walk, "push": push}
 
 
-def cycles(files: dict[str, str]) -> Iterator[str]:
-    """Cheapest cycles at NAO's 0.03 m/s times the root of lambda, in the model and over some steps in the engine."""
-    from nlp_gait.simulation.drive import Drive
-    from nlp_gait.simulation.measurements import measure_walk
-    from nlp_gait.simulation.plan import make_plan
-    from nlp_gait.simulation.simulate import simulate_plan
+def run(names: list[str], folder: Path, margins: list[float]) -> None:
+    """Run the stages that a robot's file lacks, one robot after another."""
+    (folder / "plans").mkdir(parents=True, exist_ok=True)
+    for name in names:
+        file = folder / find_plan(folder, name).name
+        row: Row = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {"name": name, "margins": margins}
+        for stage, compute in STAGES.items():
+            if stage not in row and (stage == "plan" or "energy_J_per_m" in row["plan"]):
+                row[stage] = compute(name, folder, row)
+                file.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
+                print(name, stage, json.dumps(row[stage])[:200], flush=True)
 
+
+def list_rows(folder: Path) -> list[Row]:
+    """Return the stored rows of all robots, in order; a robot without a file has only its name."""
+    files = [(name, folder / find_plan(folder, name).name) for name in list_names()]
+    return [json.loads(file.read_text(encoding="utf-8")) if file.exists() else {"name": name} for name, file in files]
+
+
+def tabulate_walks(folders: list[Path]) -> Iterator[str]:
+    """Tabulate the robots that have a plan."""
     yield header(
-        "robot",
-        "leg m",
-        "mass kg",
-        "speed m/s",
-        "step m",
-        "power W",
-        "cost of transport",
-        "margins mm",
-        "binding",
-        "engine",
+        "`--robot`",
+        "mass, kg",
+        "J/m",
+        "speed, m/s",
+        "margins, mm",
+        "walked in open loop",
+        "with `balance`",
+        "push in open loop, N s",
+        "with `balance`, N s",
     )
-    for name, file in files.items():
-        problem = nlp_gait.load("humanoid-cycle", robot=file, objective="power")
-        solution = nlp_gait.solve(problem, starts=4, seed=0)
-        x = np.array(list(solution.x.values()))
-        indexes = build_exact_model(problem).at(x, problem.p).indexes
-        robot, played = problem.display.robot, "-"
-        assert robot is not None
-        if solution.converged:
-            plan = make_plan(Result(problem=problem, x=x), STEPS)
-            walked = measure_walk(plan, simulate_plan(plan), Drive(), STEPS)
-            m = walked.measurements
-            played = f"falls at {m.fell_at_s:.1f} s" if m.fallen else f"{walked.steps_done} steps"
-            if walked.engine_J_per_planned_m is not None:
-                played += f", {walked.engine_J_per_planned_m / (robot.mass_kg * GRAVITY):.3f}"
-        margins = [1e3 * indexes[f"ssp_dbm_{axis}_min_m"] for axis in "xy"]
-        leg = leg_of(problem)
+    for row in list_rows(folders[0]):
+        plan = row.get("plan", {})
+        if "energy_J_per_m" not in plan:
+            continue
         yield cells(
-            name,
-            f"{leg:.3f}",
-            f"{robot.mass_kg:.1f}",
-            f"{indexes['speed_m_s']:.4f}",
-            f"{indexes['step_length_m']:.3f}",
-            f"{indexes['power_W']:.3f}" if solution.converged else "not feasible",
-            f"{indexes['cost_of_transport']:.3f}",
-            ", ".join(f"{margin:.0f}" for margin in margins),
-            ", ".join(active.name for active in solution.active_constraints[:3]),
-            played,
+            f"`{row['name']}`",
+            f"{plan['mass_kg']:.1f}",
+            f"{plan['energy_J_per_m']:.3g}",
+            f"{plan['speed_m_s']:.2f}",
+            ", ".join(f"{1e3 * margin:.0f}" for margin in plan["margins_m"]),
+            *(describe_walk(row, feedback) for feedback in FEEDBACKS),
+            *(describe_pushes(row, feedback) for feedback in FEEDBACKS),
         )
 
 
-def leg_of(problem: GaitProblem) -> float:
-    """Length of a leg [m]."""
-    assert problem.display.robot is not None
-    return make_biped_model(problem.display.robot).leg_length_m
+def tabulate_margins(folders: list[Path]) -> Iterator[str]:
+    """Tabulate energy and pushes of the robots that have plans in all folders, each with other margins."""
+    yield header(
+        "robot", "margins along, across, of a sole", "J/m", "in open loop", "with `balance`", "push with `balance`, N s"
+    )
+    for rows in zip(*map(list_rows, folders), strict=True):
+        if not all("push" in row for row in rows):
+            continue
+        for row in sorted(rows, key=lambda row: row["margins"]):
+            yield cells(
+                row["plan"]["robot"],
+                ", ".join(f"{100.0 * share:.0f} %" for share in row["margins"]),
+                f"{row['plan']['energy_J_per_m']:.3g}",
+                *(describe_walk(row, feedback) for feedback in FEEDBACKS),
+                describe_pushes(row, "balance"),
+            )
 
 
-GROUPS: dict[str, Callable[[dict[str, str]], Iterator[str]]] = {
-    "starts": starts,
-    "searches": searches,
-    "steps": steps,
-    "cycles": cycles,
-}
+def describe_walk(row: Row, feedback: str) -> str:
+    """Return the share of the planned distance that a robot walks, or when it falls."""
+    if "walk" not in row:
+        return "not run"
+    walked = row["walk"][feedback]
+    return f"{walked['walked']:.1%}" if walked["fell_at_s"] is None else f"falls at {walked['fell_at_s']:.1f} s"
+
+
+def describe_pushes(row: Row, feedback: str) -> str:
+    """Return the largest impulses forward, backward, to the left and to the right that a robot survives [N s]."""
+    if "walk" in row and row["walk"][feedback]["fell_at_s"] is not None:
+        return "falls unpushed"
+    if "push" not in row:
+        return "not run"
+    return ", ".join(f"{impulse:.2g}" for impulse in row["push"][feedback].values())
+
+
+def tabulate_others(folders: list[Path]) -> Iterator[str]:
+    """Tabulate the robots that are refused or have no feasible plan, and those that were not run."""
+    yield header("`--robot`", "why it has no walk here")
+    for row in list_rows(folders[0]):
+        plan = row.get("plan", {"not run": "time"})
+        if "refused" in plan:
+            yield cells(f"`{row['name']}`", f"refused: {shorten(plan['refused'])}")
+        elif "infeasible" in plan:
+            yield cells(f"`{row['name']}`", f"no feasible walk: {plan['infeasible'][0].partition(' (')[0]}")
+        elif "not run" in plan:
+            why = "its package downloads it" if "download" in plan["not run"] else "time"
+            yield cells(f"`{row['name']}`", f"not run ({why})")
+
+
+def shorten(message: str) -> str:
+    """Return the sentence of an error that names the fault, without the robot's name and the remedy."""
+    fault = re.sub(r"^robot (file )?'[^']*': ", "", message)
+    if pair := re.search(r"the lowest pair, .*?(?=; if other)|no links are mirror images", fault):
+        return pair[0]
+    return re.split(r"\. [A-Z]|; (?:correct|else|a rigid body)", fault)[0]
+
+
+TABLES = {"walks": tabulate_walks, "others": tabulate_others, "margins": tabulate_margins}
 
 
 def main() -> None:
-    """Run the groups that are asked for."""
+    """Run the robots that are asked for, or print the table of what has finished."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "groups", nargs="*", metavar="GROUP", default=[], help=f"of {', '.join(GROUPS)}; all by default"
-    )
-    parser.add_argument("--robots", default="", help="names, separated by commas")
+    parser.add_argument("folders", type=Path, nargs="+", metavar="FOLDER")
+    parser.add_argument("--margins", default=",".join(map(str, MARGINS)), help="as of nlp-gait plan")
+    parser.add_argument("--robots", default="", help="names, separated by commas; all by default")
+    parser.add_argument("--table", choices=TABLES, help="print this table of what has finished")
     arguments = parser.parse_args()
-    wanted = set(filter(None, arguments.robots.split(",")))
-    files = {name: file for name, file in robots().items() if not wanted or name in wanted}
-    for group in arguments.groups or GROUPS:
-        print(f"\n{GROUPS[group].__doc__}\n", flush=True)
-        for line in GROUPS[group](files):
-            print(line, flush=True)
+    if arguments.table is not None:
+        print("\n".join(TABLES[arguments.table](arguments.folders)))
+        return
+    names = list(filter(None, arguments.robots.split(","))) or list_names()
+    run(names, arguments.folders[0], [float(share) for share in arguments.margins.split(",")])
 
 
 if __name__ == "__main__":
