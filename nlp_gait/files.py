@@ -20,6 +20,7 @@ import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -267,13 +268,17 @@ def replace_file(path: Path) -> Iterator[Path]:
 
 
 def replace_nan(data: Any) -> Any:
-    """Return the same plain data with null for every number that is not finite."""
+    """Return data, data classes included, as plain data with null for every number that is not finite."""
     if isinstance(data, float):
         return data if math.isfinite(data) else None
+    if data is None or isinstance(data, (str, int)):
+        return data
     if isinstance(data, Mapping):
         return {key: replace_nan(value) for key, value in data.items()}
     if isinstance(data, (list, tuple)):
         return [replace_nan(value) for value in data]
+    if is_dataclass(data):
+        return {item.name: replace_nan(getattr(data, item.name)) for item in fields(data)}
     return data
 
 

@@ -10,7 +10,7 @@ import typer
 from typer import Argument, Option
 
 from compare.analysis.columns import PRINTED, format_rows, summarise
-from compare.analysis.comparison import compare_problems
+from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.failures import describe_unknown, find_failures
 from compare.analysis.headline import write_headlines
 from compare.analysis.tuning import tune_solvers
@@ -149,11 +149,12 @@ def compare(
         say_error(failure.sentence)
     lost = ", ".join(failure.solver for failure in failures if failure.failed == failure.runs)
     remedy = f"without any result: {lost}; fix the cause, and delete the failed records to run them again"
+    comparisons = compare_problems(records)
     return Output(
-        data={"problems": summarise_problems(records), "runs": [_encode_run(record) for record in records]},
-        parts=[*_tabulate_runs(records), *describe_summaries(records)],
+        data={"problems": summarise_problems(comparisons), "runs": [_encode_run(record) for record in records]},
+        parts=[*_tabulate_runs(comparisons), *describe_summaries(comparisons)],
         written=written,
-        answer=write_headlines(compare_problems(records)),
+        answer=write_headlines(comparisons),
         failures=[*list_excluded(imported.sentences), *([remedy] if lost else [])],
     )
 
@@ -198,9 +199,9 @@ def list_excluded(excluded: Sequence[str]) -> list[str]:
     return [*named, f"{count}; delete what is named, and rerun the study to compute it again"]
 
 
-def summarise_problems(records: Sequence[RunRecord]) -> dict[str, Any]:
+def summarise_problems(comparisons: Sequence[Comparison]) -> dict[str, Any]:
     """Return the table of solvers by problem as plain data."""
-    return {comparison.problem: summarise(comparison) for comparison in compare_problems(records)}
+    return {comparison.problem: summarise(comparison) for comparison in comparisons}
 
 
 ENCODED = "problem solver run claimed_objective claimed_violation failed_evaluations status x verdict".split()
@@ -212,9 +213,9 @@ def _encode_run(record: RunRecord) -> dict[str, Any]:
     return {**{key: plain[key] for key in ENCODED}, "seed": record.seed, **costs}
 
 
-def _tabulate_runs(records: Sequence[RunRecord]) -> Iterator[Rows]:
+def _tabulate_runs(comparisons: Sequence[Comparison]) -> Iterator[Rows]:
     """Yield a table of the runs of each problem that has few of them, as judged by the exact functions."""
-    for comparison in compare_problems(records):
+    for comparison in comparisons:
         if len(comparison.records) > MOST_RUNS:
             continue
         rows = []
@@ -226,9 +227,9 @@ def _tabulate_runs(records: Sequence[RunRecord]) -> Iterator[Rows]:
         yield Rows(f"{comparison.problem}: runs", header, rows)
 
 
-def describe_summaries(records: Sequence[RunRecord]) -> Iterator[str | Rows]:
+def describe_summaries(comparisons: Sequence[Comparison]) -> Iterator[str | Rows]:
     """Yield the table of solvers for each problem."""
-    for comparison in compare_problems(records):
+    for comparison in comparisons:
         yield Rows(f"{comparison.problem}: judged by the exact functions", *format_rows(comparison, PRINTED))
         failures = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in find_failures(comparison.records)]
         if failures:

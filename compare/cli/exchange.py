@@ -5,6 +5,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
+from compare.analysis.comparison import compare_problems
 from compare.archive import pack_study, verify_archive, verify_folder
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
 from compare.cli.compare import describe_summaries, list_excluded, summarise_problems
@@ -43,7 +44,7 @@ def import_results(
     kept = write_records(records, out)
     evidence = read_evidence(out)
     report = write_report(out, evidence.records, read_manifest(out), excluded=evidence.excluded)
-    shown = [record for record in evidence.records if record.problem == spec.title]
+    shown = compare_problems([record for record in evidence.records if record.problem == spec.title])
     return Output(
         data={"problems": summarise_problems(shown)},
         parts=list(describe_summaries(shown)),

@@ -10,7 +10,8 @@ import numpy as np
 from compare.judge import evaluate
 from compare.study.evidence import CheckedRecords, check_records
 from compare.study.record import History, RunRecord, Times, Verdict
-from compare.study.record_files import RECORDS, read_records
+from compare.study.record_files import name_run, read_records
+from compare.study.settings import read_manifest
 from compare.study.task import LABEL, Inputs, ProblemSpec
 from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
 from nlp_gait.columns import CsvTable, read_table
@@ -152,7 +153,7 @@ def _read_histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History,
 
 def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> CheckedRecords:
     """Return the checked imported records in a folder whose problems are those of some records."""
-    if not (folder / RECORDS).is_dir():
+    if not set(read_manifest(folder).runs).difference(map(name_run, records)):
         return CheckedRecords([], [])
     known = {record.problem: record.inputs.problem for record in records}
     imported = [

@@ -9,7 +9,7 @@ import itertools
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -190,7 +190,7 @@ class RunRecord:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data with a schema version; numbers that are not finite become null."""
-        return {"schema": SCHEMA, **replace_nan(asdict(self))}
+        return {"schema": SCHEMA, **replace_nan(self)}
 
 
 def read_record(path: Path) -> RunRecord:
@@ -211,7 +211,7 @@ def parse_record(raw: Any) -> RunRecord:
     if math.isnan(record.verdict.violation):
         record = replace(record, verdict=replace(record.verdict, violation=math.inf))
     decode(StoredProblem, record.inputs.problem, "inputs.problem")
-    if json.loads(json.dumps(replace_nan(asdict(record.inputs)))) != raw["inputs"]:
+    if json.loads(json.dumps(replace_nan(record.inputs))) != raw["inputs"]:
         raise ValueError("inputs must have every field, defaults too")  # a default would be another run's
     for text in (record.inputs.objective.name, record.inputs.objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula

@@ -63,6 +63,12 @@ def load_shipped() -> tuple[Shipped, ...]:
     return tuple(decode(Shipped, item) for item in raw)
 
 
+@cache
+def _list_shipped() -> tuple[tuple[Shipped, Mapping[str, Any]], ...]:
+    """Return the shipped values with their problems as plain data."""
+    return tuple((entry, asdict(entry.problem)) for entry in load_shipped())
+
+
 def find_reference(problem: Mapping[str, Any]) -> Reference:
     """Return the reference of a problem as ``identify_problem`` describes it; without a shipped value, one that says so.
 
@@ -70,7 +76,7 @@ def find_reference(problem: Mapping[str, Any]) -> Reference:
     """
     if PROBES not in problem and problem.get("name") in PROBLEMS:
         problem = _identify(json.dumps(problem, sort_keys=True))
-    differences = [(entry, describe_difference(asdict(entry.problem), problem)) for entry in load_shipped()]
+    differences = [(entry, describe_difference(stored, problem)) for entry, stored in _list_shipped()]
     shipped = next((entry for entry, difference in differences if not difference), None)
     if shipped is None:
         if generated := _find_generated(str(problem.get("options", {}).get("instance", "")), problem):
