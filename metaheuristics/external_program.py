@@ -25,6 +25,7 @@ LONGEST_REASON = 300  # characters of a program's last message
 END_WITHIN_S = 2.0  # after the line that ends the run
 CHECKED_EVERY_S = 0.1
 MOST_WAITING = 2  # lines that a program may be ahead
+SILENT = ": it has not sent its first line; it must flush its output, and in Octave read with input('', 's'), not fgetl(stdin)"
 ROUNDING = 1e-9  # share of a range by which printed digits may miss a bound
 
 
@@ -44,9 +45,11 @@ class ExternalProgram:
     settings: Mapping[str, Any] = field(default_factory=dict)  #: sent to the program
     population: int = 1  #: as a program has no first generation
     answer_s: float = 600.0  #: longest time between two of its lines [s]; then it is killed
+    first_answer_s: float = 60.0  #: likewise, from its start to its first line
 
     def __post_init__(self) -> None:
         check_number(self, "answer_s", above=0.0)
+        check_number(self, "first_answer_s", above=0.0)
 
     def start(self, start: Start) -> "_ProgramSearch":
         """Begin a run; see `Algorithm.start`."""
@@ -55,7 +58,7 @@ class ExternalProgram:
 
 class _ProgramSearch(CallingSearch):
     def __init__(self, settings: ExternalProgram, start: Start) -> None:
-        self._settings, self._start = settings, start
+        self._settings, self._start, self._has_answered = settings, start, False
         self._lines: queue.Queue[bytes | None] = queue.Queue(maxsize=MOST_WAITING)
 
     def run(self, evaluate: Evaluate) -> str:
@@ -104,7 +107,8 @@ class _ProgramSearch(CallingSearch):
 
     def _read(self, program: subprocess.Popen[bytes]) -> bytes | None:
         """Return the program's next line, or None after the last one."""
-        latest = monotonic() + self._settings.answer_s
+        limit = self._settings.answer_s if self._has_answered else self._settings.first_answer_s
+        latest = monotonic() + limit
         while True:
             ended = program.poll() is not None
             if ended:  # what it has started may hold its output for ever
@@ -116,9 +120,12 @@ class _ProgramSearch(CallingSearch):
                     continue
                 if ended:
                     return None
-                raise SearchError(f"the program sent nothing for {self._settings.answer_s:g} s") from None
+                raise SearchError(
+                    f"the program sent nothing for {limit:g} s{'' if self._has_answered else SILENT}"
+                ) from None
             if line is not None and len(line) == LONGEST_LINE:
                 raise SearchError(f"the program sent a line of {LONGEST_LINE} bytes or more")
+            self._has_answered = True
             return line
 
     def _parse(self, line: bytes) -> dict[str, Any]:

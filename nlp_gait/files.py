@@ -68,11 +68,11 @@ def flush(path: Path) -> None:
 
 
 @contextmanager
-def lock_folder(path: Path) -> Iterator[None]:
+def lock_folder(path: Path, name: str = LOCK) -> Iterator[None]:
     """Let one process at a time into such a block for a folder, by a file in it; no lock where that cannot be written."""
     from filelock import FileLock  # on first use: most commands lock nothing
 
-    lock = FileLock(path / LOCK)
+    lock = FileLock(path / name)
     with suppress(OSError):  # a folder that may only be read, a full disk
         lock.acquire(poll_interval=LOCK_CHECKED_EVERY_S)
     try:

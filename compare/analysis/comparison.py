@@ -24,9 +24,9 @@ from compare.study.references import BETTER, Reference, find_reference
 from compare.study.task import GRADIENT_SOLVERS, SOURCE
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Objective
-from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
 DEFAULT_WEIGHTING = Weighting()
+SMALLEST_GAP = 1e-8  # that is shown; points may differ from the best known value by less in their last digits
 FOUND = 1e-6  # a run with at most this gap has reached the best known value
 
 
@@ -133,9 +133,9 @@ class Comparison:
         return sum(len(curve.gap) > 0 and curve.gap.min() <= FOUND for curve in solver.curves)
 
     def format_gap(self, gap: float | None) -> str:
-        """Format a gap in percent, 0 within the judge's tolerance, or in the objective's unit from a value near zero."""
+        """Format a gap in percent, 0 below ``SMALLEST_GAP``, or in the objective's unit from a value near zero."""
         if gap is None or not math.isfinite(gap) or not is_zero(self.reference):
-            return format_percent(0.0 if gap is not None and abs(gap) <= FEASIBILITY_TOLERANCE else gap)
+            return format_percent(0.0 if gap is not None and abs(gap) < SMALLEST_GAP else gap)
         return f"below {ZERO:g}" if abs(gap) < ZERO else with_unit(gap, self.objective.unit, ".2g")
 
     def gap(self, cost: float) -> float:

@@ -21,6 +21,7 @@ from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
 from compare.cli.options import Evaluations, Jobs, Scheduler, Tune, parse_names
 from compare.cli.printing import Output, Rows, describe_command, show_progress, tabulate
+from compare.report.document import Document, make_text_table
 from compare.report.writing import add_session, write_document
 from compare.study.settings import SolverSpec
 from compare.study.task import check_task
@@ -86,7 +87,7 @@ def bench(
     `nlp-gait bench --algorithm my.py:MyAlgo --families walk12-long,ssp --seeds 0:5 --out DIR`,
     `nlp-gait bench --algorithm pso --label pso-again`, `nlp-gait bench --audit --algorithm my.py:MyAlgo`
     """
-    return _audit(algorithm) if audit else _rank(algorithm, label, chosen, effort)
+    return _audit(algorithm, effort.out) if audit else _rank(algorithm, label, chosen, effort)
 
 
 def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEffort) -> Output:
@@ -137,8 +138,8 @@ def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEff
     )
 
 
-def _audit(algorithm: str | None) -> Output:
-    """Audit a search."""
+def _audit(algorithm: str | None, folder: Path) -> Output:
+    """Audit a search, and write the page of its effects."""
     if algorithm is None:
         raise InputError("--audit examines one search: name it with --algorithm")
     task = make_bench_study(INSTANCES[:1], SolverSpec(name=algorithm)).tasks()[0]
@@ -149,12 +150,15 @@ def _audit(algorithm: str | None) -> Output:
         audit = audit_search(task.make_search(), progress=advance)
     rows = [(e.change, e.verdict, f"{e.a12:.2f}", f"{e.p:.2g}") for e in audit.effects]
     effects = [{**asdict(effect), "verdict": effect.verdict} for effect in audit.effects]
+    title, header = f"{task.title}: gait problems in other places of the box", ("change", "result", "A12", "p")
+    noise = (
+        f"on noise, {100 * audit.edge:.1f} % of the variables end at a bound (unbiased: 0 %), {100 * audit.middle:.0f} % in "
+        "the middle 10 % of their ranges (unbiased: 10 %)"
+    )
+    verdict = "; ".join(audit.accusations) or "no bias found"
+    page = Document(title=title, headline=(f"{task.title}: {verdict}.",), parts=(make_text_table(header, rows), noise))
     return Output(
         data={**asdict(audit), "effects": effects, "accusations": list(audit.accusations)},
-        parts=[
-            Rows(f"{task.title}: gait problems in other places of the box", ("change", "result", "A12", "p"), rows),
-            f"on noise, {100 * audit.edge:.1f} % of the variables end at a bound (unbiased: 0 %), {100 * audit.middle:.0f} % in "
-            "the middle 10 % of their ranges (unbiased: 10 %)",
-            "; ".join(audit.accusations) or "no bias found",
-        ],
+        parts=[Rows(title, header, rows), noise, verdict],
+        written=write_document(make_writable_folder(folder), add_session(page, describe_command(), ()), "audit"),
     )

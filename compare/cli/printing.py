@@ -145,10 +145,15 @@ def tabulate(title: str, items: Iterable[T], columns: Mapping[str, Callable[[T],
 
 @contextmanager
 def show_progress(description: str, total: int | None) -> Iterator[Callable[..., None]]:
-    """Show progress on stderr, of unknown length if total is None; the yielded function takes a note, and steps other than 1."""
+    """Show progress on stderr, of unknown length if total is None.
+
+    The yielded function takes a note, whose lines are shown below the bar, and steps other than 1.
+    """
     if not stderr.is_terminal:
         yield _ProgressLog(description, total)
         return
+    from rich.console import Group
+    from rich.live import Live
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -164,11 +169,16 @@ def show_progress(description: str, total: int | None) -> Iterator[Callable[...,
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}", markup=False),
     )
-    with Progress(*columns, console=stderr, transient=True) as progress:
-        task = progress.add_task(escape_controls(description), total=total, note="")
-        yield lambda note, steps=1: progress.update(task, advance=steps, note=escape_controls(note))
+    progress = Progress(*columns, console=stderr)
+    task = progress.add_task(escape_controls(description), total=total)
+    with Live(progress, console=stderr, transient=True) as live:
+
+        def advance(note: str, steps: int = 1) -> None:
+            progress.advance(task, steps)
+            live.update(Group(progress, Text(escape_controls(note))))
+
+        yield advance
 
 
 class _ProgressLog:
@@ -184,4 +194,5 @@ class _ProgressLog:
         if now - self.reported >= LOG_PERIOD_S:
             self.reported = now
             of = "" if self.total is None else f" of {self.total}"
-            say(f"{self.description}: {self.done}{of} after {now - self.started:.0f} s; {note}")
+            lines = note.replace("\n", "; ")
+            say(f"{self.description}: {self.done}{of} after {now - self.started:.0f} s; {lines}")

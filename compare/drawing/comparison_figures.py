@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
+from compare.analysis.comparison import SMALLEST_GAP, Comparison, SolverRuns, index_solvers
 from compare.analysis.overview import Ranking
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS, compute_band, compute_ecdf, compute_profiles
 from compare.analysis.units import format_percent
@@ -22,8 +22,6 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Relative gaps below this are drawn at this value: solvers' tolerances are near it.
-SMALLEST_GAP = FEASIBILITY_TOLERANCE
 GRID_POINTS = 120
 AXES = {"evaluations": "equivalent evaluations", "seconds": "seconds of the solve"}
 GAP = "gap to best known [%]"
@@ -111,7 +109,7 @@ def _trace_gaps(solver: SolverRuns, axis: str) -> list[Series]:
 
 
 def clip_percent(gap: Array) -> Array:
-    """Return the gap in percent, not below the smallest one shown."""
+    """Return the gap in percent; smaller ones than ``SMALLEST_GAP`` are drawn at it."""
     return 100.0 * np.maximum(gap, SMALLEST_GAP)
 
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from statistics import mean, median, stdev
 
-from compare.analysis.comparison import Comparison, index_solvers
+from compare.analysis.comparison import SMALLEST_GAP, Comparison, index_solvers
 from compare.analysis.overview import count_wins, list_user_solvers, rank_over_problems
 from compare.analysis.pairs import SIGNIFICANT
 from compare.analysis.units import join_words, make_heading, with_unit
@@ -17,7 +17,6 @@ SPECIAL = str.maketrans(
 )
 UNKNOWN = "--"
 LEAST_DECIMALS, MOST_DECIMALS = 4, 10
-LEAST_GAP = 1e-8  # smaller ones are rounding
 
 
 def format_latex_table(comparison: Comparison, decimals: int | None = None) -> str:
@@ -146,7 +145,7 @@ def _format_gap(gap: float) -> str:
     """Return a gap as a power of ten with two digits."""
     if not math.isfinite(gap):
         return "infeasible"
-    if gap < LEAST_GAP:
+    if gap < SMALLEST_GAP:
         return "$<10^{-8}$" if gap > 0.0 else "0"
     digits, exponent = f"{gap:.1e}".split("e")
     return rf"${digits}\cdot 10^{{{int(exponent)}}}$"

@@ -20,8 +20,8 @@ FIGURES = {
     "final": (make_final_gap_charts, "Bar: median; dotted: tolerance."),
     "convergence": (
         make_convergence_charts,
-        "Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end. Gaps below the "
-        "judge's tolerance are drawn at that value.",
+        "Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end. Gaps below 1e-6 % "
+        "are drawn at that value.",
     ),
     "runtime": (
         make_ecdf_charts,

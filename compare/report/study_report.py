@@ -26,7 +26,7 @@ from compare.report.study_sections import (
 from compare.report.writing import write_document
 from compare.study.evidence import Exclusion, read_evidence
 from compare.study.record import RunRecord, load_gait
-from compare.study.record_files import RECORDS
+from compare.study.record_files import RECORDS, name_group
 from compare.study.settings import Manifest, read_manifest
 from nlp_gait.files import make_file_name, replace_nan, write_json, write_text
 
@@ -90,6 +90,7 @@ def make_study_document(
         title="Solvers on " + ", ".join(c.problem for c in comparisons),
         headline=write_headlines(comparisons),
         parts=(
+            *_describe_progress(manifest, [r for c in comparisons for r in c.records], len(excluded)),
             *_list_excluded(excluded),
             *(make_problem_section(c, gaits[c.problem]) for c in comparisons),
             *((make_overview(comparisons),) if len(comparisons) >= MANY else ()),
@@ -105,6 +106,17 @@ def make_study_document(
             make_settings_section(comparisons, manifest.sessions),
         ),
     )
+
+
+def _describe_progress(manifest: Manifest, records: Sequence[RunRecord], excluded: int) -> tuple[str, ...]:
+    """Return a sentence while runs of the latest command, or of the solvers in the report, are missing."""
+    shown = {(record.problem, record.solver) for record in records}
+    if manifest.settings is not None:
+        shown |= {(task.problem.title, task.title) for task in manifest.settings.tasks()}
+    groups = {name_group(*titles) for titles in shown}
+    planned = sum(name.rsplit("-", 2)[0] in groups for name in manifest.runs)
+    finished = len(records) + excluded
+    return (f"{finished} of {planned} runs have ended; all numbers are of these.",) if finished < planned else ()
 
 
 def _list_excluded(excluded: Sequence[Exclusion]) -> tuple[Section, ...]:

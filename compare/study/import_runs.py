@@ -153,7 +153,7 @@ def _read_histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History,
 
 def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> CheckedRecords:
     """Return the checked imported records in a folder whose problems are those of some records."""
-    if not set(read_manifest(folder).runs).difference(map(name_run, records)):
+    if not set(read_manifest(folder).runs).difference(name_run(r) for r in records if not r.inputs.imported):
         return CheckedRecords([], [])
     known = {record.problem: record.inputs.problem for record in records}
     imported = [

@@ -22,7 +22,12 @@ def name_run(run: Task | RunRecord) -> str:
         labels, inputs = (run.problem.title, run.title), run.inputs()
     else:
         labels, inputs = (run.problem, run.solver), run.inputs
-    return f"{'/'.join(labels)}-{run.run:04d}-{inputs.key}".replace(":", ".")
+    return f"{name_group(*labels)}-{run.run:04d}-{inputs.key}"
+
+
+def name_group(problem: str, solver: str) -> str:
+    """Return ``<problem>/<solver>``, with which the names of all runs of a solver on a problem begin."""
+    return f"{problem}/{solver}".replace(":", ".")
 
 
 def locate_record(folder: Path, run: Task | RunRecord) -> Path:

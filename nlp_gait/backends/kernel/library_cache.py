@@ -1,8 +1,9 @@
 """Shared libraries built from generated source, stored in the user's cache folder.
 
 The name of a library consists of a hash of everything that it depends on and the checksum of the file. It is written under
-another name and renamed, so that several processes may build it at once. A file that does not match its checksum is rebuilt.
-A library is hashed and loaded through one descriptor of its folder, so that no other user can exchange it in between.
+another name and renamed; processes that need it at the same time wait for the first one. A file that does not match its
+checksum is rebuilt. A library is hashed and loaded through one descriptor of its folder, so that no other user can exchange
+it in between.
 """
 
 import atexit
@@ -21,7 +22,7 @@ from pathlib import Path
 
 from nlp_gait.backends.kernel.compiler import Compiler
 from nlp_gait.errors import CompilerError, warn_once
-from nlp_gait.files import convert_errors, flush, make_folder, make_temporary_folder, rename
+from nlp_gait.files import convert_errors, flush, lock_folder, make_folder, make_temporary_folder, rename
 
 FOLDER_VARIABLE = "NLP_GAIT_CACHE"
 OPEN_FILES = Path("/proc/self/fd")  # of Linux: each open file and folder under its number
@@ -43,12 +44,30 @@ def load_library(
     machine = (platform.system(), platform.machine(), *platform.libc_ver())
     inputs = (source, *compiler.command, compiler.version, *flags, *machine)
     key = hashlib.sha256("\0".join(inputs).encode()).hexdigest()[:32]
+    if found := _find_library(key, symbols):
+        return found
+    with lock_folder(find_cache_folder(), f"{key}.lock"):  # another process may be building it
+        return _find_library(key, symbols) or _build_library(key, source, compiler, flags, symbols, write_source)
+
+
+def _find_library(key: str, symbols: Sequence[str]) -> tuple[ctypes.CDLL, Path] | None:
     # The private folder counts if this process has needed one.
     folders = [find_cache_folder(), *([make_private_folder()] if make_private_folder.cache_info().currsize else [])]
     for library in (file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))):
         loaded = load_if_valid(library, symbols)
         if loaded is not None:
             return loaded, library
+    return None
+
+
+def _build_library(
+    key: str,
+    source: str,
+    compiler: Compiler,
+    flags: Sequence[str],
+    symbols: Sequence[str],
+    write_source: Callable[[], str] | None,
+) -> tuple[ctypes.CDLL, Path]:
     with make_temporary_folder("nlp-gait-build-", CompilerError) as workshop:
         file, built = workshop / "source.cpp", workshop / f"library{SUFFIX}"
         try:
