@@ -103,7 +103,7 @@ class Simulation:
 
 
 class Run:
-    """A simulation in progress."""
+    """A simulation in progress; ``data`` is the engine's present state."""
 
     def __init__(
         self,
@@ -111,13 +111,14 @@ class Run:
         conditions: Conditions | None = None,
         drive: Drive | None = None,
         sole: str = "rectangle",
+        settle_s: float = SETTLE_TIME,
     ) -> None:
-        """Begin at the planned state; raises MissingExtraError."""
+        """Begin at the planned state, to end some time after the plan; raises MissingExtraError."""
         self._engine, self.plan = load_mujoco(), plan
         drive, self._conditions = drive or Drive(), conditions or Conditions()
         self.model, self.data = prepare(plan, self._conditions, drive, sole)
         self._addresses = Addresses(self.model, plan)
-        steps = round((plan.duration_s + SETTLE_TIME) / TIME_STEP)
+        steps = round((plan.duration_s + settle_s) / TIME_STEP)
         times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
         self._commands = drive.set_points(plan.at, times, [plan.robot.joint(name) for name in plan.joints])
         heights, self._axes = plan.at("hip", times)[:, 2], plan.torso_axis(times)
@@ -131,11 +132,6 @@ class Run:
     def time_s(self) -> float:
         """Simulated time [s]."""
         return self._step * TIME_STEP
-
-    @property
-    def positions(self) -> Array:
-        """Present coordinates (Q,) of the robot, as in ``Simulation.states``."""
-        return np.array(self.data.qpos)
 
     def advance(self, until_s: float = math.inf) -> bool:
         """Simulate until a time, the end of the walk or a fall; return whether the robot is still up and on its way."""

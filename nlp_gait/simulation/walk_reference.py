@@ -132,22 +132,24 @@ def _split(times: Array, stands: Any) -> list[SupportPhase]:
 def _integrate_carry(phases: list[SupportPhase], load_left: Array, rate: float) -> Array:
     """Return the share w (T,) of the landing foot's offset in the offset of the divergent component: w' = rate (w - its load).
 
-    It is integrated backward from 1 at the end of each double support; in the swing before, the foot bears no load.
+    It is integrated backward: from 1 at the end of each double support, from the load at the end of the walk, where the robot
+    rests; in the swing before, the foot bears no load. Before the first step it is the load of the left foot.
     """
-    carry, decay = np.ones(len(load_left)), np.exp(-rate * STEP_S)
-    value, first = 1.0, True
+    carry, decay = load_left.copy(), np.exp(-rate * STEP_S)
     for before, phase in zip([None, *phases[:-1]][::-1], phases[::-1], strict=True):
         a, b = round(phase.start_s / STEP_S), round(phase.end_s / STEP_S)
+        load = np.zeros(len(load_left))
         if phase.swing is None:
-            if before is None:  # before the first step no foot has moved
-                carry[a:b] = 1.0
-                continue
+            if before is None:
+                break
             load = load_left if before.swing == 0 else 1.0 - load_left
             value = 1.0
-        else:
-            load = np.zeros(len(load_left))
-        if first:
-            carry[b:], first = value, False
+            if phase is phases[-1]:
+                value = load[-1]
+                carry[b:] = value
+        elif phase is phases[-1]:
+            value = 1.0
+            carry[b:] = value
         for k in range(b - 1, a - 1, -1):
             value = carry[k] = load[k] + (value - load[k]) * decay
     return carry

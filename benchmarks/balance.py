@@ -1,0 +1,171 @@
+"""What balance feedback survives: pushes of whole walks, disturbed worlds, pushes at rest, and the time that it takes.
+
+    python -m benchmarks.balance pushes WALK.json...        | python -m docs.pages.numbers balance-pushes
+    python -m benchmarks.balance conditions WALK.json...    | python -m docs.pages.numbers balance-conditions
+    python -m benchmarks.balance rest WALK.json...          | python -m docs.pages.numbers balance-rest
+
+Walks are those that ``nlp-gait plan`` writes. Units of impulse are mass sqrt(gravity height); directions are those of the floor.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+
+from benchmarks.engine.markdown import cells, header
+from nlp_gait.formulation import load_result
+from nlp_gait.simulation.drive import Drive, choose_feedback
+from nlp_gait.simulation.mjcf import Bumps
+from nlp_gait.simulation.plan import Plan, make_plan
+from nlp_gait.simulation.simulate import DIRECTIONS, TIME_STEP, Conditions, Push, Run
+
+FEEDBACKS = ("none", "torso-spring", "balance")
+INSTANTS = 12  # of pushes, even over the inner steps
+LEVELS, LARGEST = 16, 0.5  # of the bisection, and its largest impulse [m sqrt(g h)]
+PUSH_S = 0.1
+SETTLE = 10.0  # [1 / w] after a push, within which a robot that has lost its balance falls
+SEEDS = range(12)
+WORLDS = {  # by name: conditions by seed, and whether sensors have noise and a delay of 4 ms
+    "bumps of 5 mm": (lambda seed: Conditions(bumps=Bumps(height_m=0.005, seed=seed)), False),
+    "mass +5 %": (lambda seed: Conditions(mass_factor=1.05), False),
+    "mass -5 %": (lambda seed: Conditions(mass_factor=0.95), False),
+    "friction 0.5": (lambda seed: Conditions(friction=0.5), False),
+    "noise, 4 ms delay": (lambda seed: Conditions(), True),
+    "all at once": (
+        lambda seed: Conditions(
+            bumps=Bumps(height_m=0.005, seed=seed), mass_factor=1.05 if seed % 2 else 0.95, friction=0.5
+        ),
+        True,
+    ),
+}
+SEEDED = ("bumps of 5 mm", "noise, 4 ms delay", "all at once")
+
+
+def load(path: str) -> tuple[str, Plan, float, float]:
+    """Return name, plan, height of the hip [m] and the unit of impulses [N s]."""
+    plan = make_plan(load_result(Path(path)))
+    height = float(plan.at("hip", np.zeros(1))[0, 2])
+    return plan.robot.name, plan, height, plan.robot.mass_kg * math.sqrt(plan.gravity * height)
+
+
+def falls(run: Run, impulse_Ns: tuple[float, float], settle_s: float) -> bool:
+    """Return whether a robot falls that is pushed now."""
+    pushed = run.fork(Push(impulse_Ns=impulse_Ns, start_s=run.time_s, duration_s=PUSH_S))
+    pushed.advance(run.time_s + settle_s)
+    return pushed.fell_at_s is not None
+
+
+def bisect(forks: list[Run], direction: str, unit_Ns: float, settle_s: float) -> float:
+    """Return the least impulse at which half of the simulations fall, to 1 / LEVELS of the largest [N s]."""
+    (x, y), low, high = DIRECTIONS[direction], 0, LEVELS
+    while high - low > 1:
+        middle = (low + high) // 2
+        impulse, fallen = LARGEST * unit_Ns * middle / LEVELS, 0
+        for k, run in enumerate(forks):
+            fallen += falls(run, (x * impulse, y * impulse), settle_s)
+            if 2 * fallen >= len(forks) or 2 * (fallen + len(forks) - k - 1) < len(forks):
+                break
+        low, high = (low, middle) if 2 * fallen >= len(forks) else (middle, high)
+    return LARGEST * unit_Ns * high / LEVELS
+
+
+def tabulate_pushes(paths: list[str]) -> Iterator[str]:
+    """Half of twelve walks fall at this impulse [N s]: pushes at instants that are even over the inner steps."""
+    yield header("robot", "unit, N s", "feedback", *DIRECTIONS)
+    for path in paths:
+        name, plan, height, unit = load(path)
+        settle = SETTLE * math.sqrt(height / plan.gravity)
+        for feedback in FEEDBACKS:
+            run, forks = Run(plan, drive=choose_feedback(Drive(), feedback)), []
+            for k in range(INSTANTS):
+                if run.advance(plan.duration_s * (0.3 + 0.4 * (k + 0.5) / INSTANTS)):
+                    forks.append(run.fork(Push(impulse_Ns=(0.0, 0.0), start_s=run.time_s)))
+            if len(forks) < INSTANTS:
+                yield cells(name, f"{unit:.0f}", feedback, f"falls at {run.fell_at_s:.1f} s without a push", "", "", "")
+                continue
+            impulses = (bisect(forks, direction, unit, settle) for direction in DIRECTIONS)
+            yield cells(name, f"{unit:.3g}", feedback, *(f"{impulse:.3g}" for impulse in impulses))
+
+
+def tabulate_conditions(paths: list[str]) -> Iterator[str]:
+    """Share of the walks that stand, and the mean share of the planned distance of those."""
+    yield header("robot", "feedback", "as planned", *WORLDS)
+    for path in paths:
+        name, plan, _, _ = load(path)
+        planned = float(np.ptp(plan.at("hip", np.array([0.0, plan.duration_s]))[:, 0]))
+        for feedback in FEEDBACKS:
+            row = [describe_walks(plan, planned, [(Conditions(), choose_feedback(Drive(), feedback))])]
+            for world, (make, noisy) in WORLDS.items():
+                walks = []
+                for seed in SEEDS if world in SEEDED else (0,):
+                    drive = choose_feedback(Drive(), feedback)
+                    if noisy and drive.balance is not None:
+                        drive = replace(drive, balance=replace(drive.balance, noise=1.0, delay_s=0.004, seed=seed))
+                    walks.append((make(seed), drive))
+                row.append(describe_walks(plan, planned, walks))
+            yield cells(name, feedback, *row)
+
+
+def describe_walks(plan: Plan, planned_m: float, walks: list[tuple[Conditions, Drive]]) -> str:
+    """Return how many walks stand, and how much of the distance they walk."""
+    shares = []
+    for conditions, drive in walks:
+        trace = Run(plan, conditions, drive).finish()
+        if trace.fell_at_s is None:
+            shares.append(float(trace.torso[-1, 0] - trace.torso[0, 0]) / planned_m)
+    distance = f", {100.0 * np.mean(shares):.0f} %" if shares else ""
+    return f"{len(shares)} of {len(walks)}{distance}"
+
+
+def tabulate_rest(paths: list[str]) -> Iterator[str]:
+    """Least impulse at rest that makes a robot fall, over that of a pendulum whose ZMP is at the edge of its soles."""
+    yield header("robot", "feedback", *DIRECTIONS, "ms per measurement")
+    for path in paths:
+        name, plan, height, unit = load(path)
+        pendulum = math.sqrt(plan.gravity / height)
+        step_ms = dict.fromkeys(("none", "balance"), 0.0)
+        for feedback in step_ms:
+            drive = choose_feedback(Drive(), feedback)
+            run, begin = Run(plan, drive=drive, settle_s=SETTLE / pendulum + 3.0), process_time()
+            run.advance(plan.duration_s + 2.0)
+            step_ms[feedback] = 1e3 * (process_time() - begin) * TIME_STEP / run.time_s
+            tick = ""
+            if drive.balance is not None:
+                tick = f"{(step_ms['balance'] - step_ms['none']) * drive.balance.period_s / TIME_STEP:.2f}"
+            if run.fell_at_s is not None:
+                yield cells(name, feedback, f"falls at {run.fell_at_s:.1f} s", "", "", "", tick)
+                continue
+            bounds = find_bounds(plan, run, pendulum)
+            shares = (bisect([run], way, unit, SETTLE / pendulum) / bounds[way] for way in DIRECTIONS)
+            yield cells(name, feedback, *(f"{share:.2f}" for share in shares), tick)
+
+
+def find_bounds(plan: Plan, run: Run, pendulum: float) -> dict[str, float]:
+    """Return the impulse by direction that takes the divergent component to the edge of the soles, m w d [N s]."""
+    data = run.data
+    places = data.site_xpos[[data.model.site(side).id for side in plan.robot.feet]]
+    soles = [plan.robot.feet[side] for side in plan.robot.feet]
+    edges = {
+        "forward": max(place[0] + sole.front_m for place, sole in zip(places, soles, strict=True)),
+        "backward": -min(place[0] - sole.back_m for place, sole in zip(places, soles, strict=True)),
+        "left": max(place[1] + sole.left_m for place, sole in zip(places, soles, strict=True)),
+        "right": -min(place[1] - sole.right_m for place, sole in zip(places, soles, strict=True)),
+    }
+    com = data.subtree_com[0]
+    return {
+        way: plan.robot.mass_kg * pendulum * (edges[way] - x * com[0] - y * com[1])
+        for way, (x, y) in DIRECTIONS.items()
+    }
+
+
+TABLES = {"pushes": tabulate_pushes, "conditions": tabulate_conditions, "rest": tabulate_rest}
+
+if __name__ == "__main__":
+    for line in TABLES[sys.argv[1]](sys.argv[2:]):
+        print(line, flush=True)
