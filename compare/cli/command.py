@@ -55,8 +55,6 @@ NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 def command(function: Callable[..., Output]) -> Callable[..., None]:
     """Make a function a Typer command: groups become options, and its output is printed; expected errors are one sentence."""
-    from metaheuristics.errors import SearchError  # imports NumPy, which the list of commands does without
-
     options = [*_list_options(function), JSON]
     files = [option.name for option in options if OUTPUT_FILE in get_marks(option)]
     outputs = {option.name for option in options if get_marks(option) & {OUTPUT, OUTPUT_FILE, OUTPUT_OF_ANY_KIND}}
@@ -85,13 +83,18 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
                 fail(output.interrupted, status=130)
             if output.failures:
                 raise typer.Exit(1)
-        except (GaitError, SearchError) as error:
+        except GaitError as error:
             fail(str(error))
         except KeyboardInterrupt as interrupt:
             fail(str(interrupt) or "interrupted; all written files are complete", status=130)
         except OSError as error:
             _report_os_error(error)
             raise typer.Exit(1) from None
+        except Exception as error:
+            searches = sys.modules.get("metaheuristics.errors")  # imports NumPy, which some commands do without
+            if searches is None or not isinstance(error, searches.SearchError):
+                raise
+            fail(str(error))
 
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}

@@ -1,23 +1,24 @@
 """``nlp-gait list``."""
 
+from __future__ import annotations
+
+import json
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Argument, Option
 
 from compare.cli.command import OUTPUT_FILE, command
-from compare.cli.printing import Output, Rows, tabulate
-from compare.study.citations import find_citations
-from compare.study.description import Description, describe_solver, list_described_names
-from compare.study.task import list_solvers
-from metaheuristics.multi_objective import FRONT_ALGORITHMS
-from nlp_gait import formulation
+from compare.cli.printing import Output, Rows
 from nlp_gait.errors import InputError
-from nlp_gait.robots import list_robots
 from nlp_gait.user_code import find_entry_points
+
+if TYPE_CHECKING:
+    from compare.study.description import Description
 
 ALGORITHMS = "algorithms"  # the name that stands for all of them
 NAME = (
@@ -47,6 +48,8 @@ def list_problems(
     `nlp-gait list --robot my_robot.urdf --out my_robot.png`, `nlp-gait list humanoid-cycle --robot my_robot.urdf`
     """
     if cite:
+        from compare.study.citations import find_citations
+
         entries = find_citations(name)
         return Output(data={"entries": entries}, parts=["\n\n".join(entries)])
     if robot is not None and name is None:
@@ -55,6 +58,8 @@ def list_problems(
         raise InputError("--out is the figure of a robot; give --robot FILE, and no problem")
     if name is None:
         return _list_all()
+    from compare.study.description import describe_solver, list_described_names
+
     known = list_described_names()
     if name != ALGORITHMS and name not in known:
         return _describe_problem(name, {} if robot is None else {"robot": robot})
@@ -101,38 +106,50 @@ def _describe_robot(name: str, target: Path | None) -> Output:
     )
 
 
-def _list_all() -> Output:
+def collect_names() -> dict[str, Any]:
+    """Return what `listed.json` has: problems with title and numbers of variables and parameters, and all other names."""
+    from compare.study.task import list_solvers
+    from metaheuristics.multi_objective import FRONT_ALGORITHMS
+    from nlp_gait import formulation
+    from nlp_gait.robots import list_robots
+
     problems = {name: formulation.load(name) for name in formulation.list_problems()}
-    installed = {"problems": find_entry_points("problem"), "algorithms": find_entry_points("algorithm")}
-    columns = {
-        "name": lambda item: item[0],
-        "description": lambda item: item[1].title,
-        "variables": lambda item: str(len(item[1].names)),
-        "parameters": lambda item: str(len(item[1].own_parameters)),
+    return {
+        "problems": {name: [p.title, len(p.names), len(p.own_parameters)] for name, p in problems.items()},
+        "algorithms": list(list_solvers()),
+        "fronts": list(FRONT_ALGORITHMS),
+        "robots": list(list_robots()),
     }
+
+
+def _list_all() -> Output:
+    """List names from a file, which a test compares with ``collect_names``: nothing else is imported."""
+    listed = json.loads(files("compare.cli").joinpath("listed.json").read_text(encoding="utf-8"))
+    kinds: tuple[Literal["problem", "algorithm"], ...] = ("problem", "algorithm")
+    installed = {f"{kind}s": find_entry_points(kind) for kind in kinds}
+    rows = [(name, title, str(n), str(p)) for name, (title, n, p) in listed["problems"].items()]
     parts: list[str | Rows] = [
-        tabulate("Problems", problems.items(), columns),
-        f"algorithms: {', '.join(list_solvers())}",
-        f"for several objectives (pareto): {', '.join(FRONT_ALGORITHMS)}",
-        f"robots: {', '.join(list_robots())}",
+        Rows("Problems", ("name", "description", "variables", "parameters"), rows),
+        f"algorithms: {', '.join(listed['algorithms'])}",
+        f"for several objectives (pareto): {', '.join(listed['fronts'])}",
+        f"robots: {', '.join(listed['robots'])}",
     ]
-    for kind, listed in installed.items():
-        if listed:
-            packages = ", ".join(f"{name} ({value})" for name, value in listed.items())
+    for kind, found in installed.items():
+        if found:
+            packages = ", ".join(f"{name} ({value})" for name, value in found.items())
             parts.append(f"{kind} of other installed packages: {packages}")
     parts.append(
         "your own problem or algorithm can be used by name: FILE.py:NAME or MODULE:NAME; a program: cmd:COMMAND"
     )
     described = {
-        name: {"title": problem.title, "variables": list(problem.names), "options": dict(problem.options)}
-        for name, problem in problems.items()
+        name: {"title": title, "variables": n, "parameters": p} for name, (title, n, p) in listed["problems"].items()
     }
-    algorithms = [*list_solvers(), *installed["algorithms"]]
-    data = {"problems": described, "algorithms": algorithms, "robots": list(list_robots()), "installed": installed}
-    return Output(data=data, parts=parts)
+    return Output(data={**listed, "problems": described, "installed": installed}, parts=parts)
 
 
 def _describe_problem(name: str, options: Mapping[str, Any]) -> Output:
+    from nlp_gait import formulation
+
     problem = formulation.load(name, **options)
     where = "".join(f" with --{key} {value}" for key, value in options.items())
     limits = [(v.name, f"{v.lower:g}", f"{v.upper:g}", v.unit, v.description) for v in problem.variables]

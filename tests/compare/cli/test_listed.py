@@ -1,0 +1,32 @@
+"""The file that `nlp-gait list` prints has the names of today, and listing imports nothing that takes time."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from importlib.resources import files
+
+from compare.cli.list import collect_names
+from tests.compare.cli.calls import as_json, nlp_gait
+
+REMEDY = "from compare.cli.list import collect_names; import json; print(json.dumps(collect_names(), indent=1))"
+
+
+def test_the_shipped_list_is_that_of_the_code() -> None:
+    shipped = json.loads(files("compare.cli").joinpath("listed.json").read_text(encoding="utf-8"))
+    assert shipped == collect_names(), f'python -c "{REMEDY}" > compare/cli/listed.json'
+
+
+def test_the_list_names_problems_algorithms_and_robots() -> None:
+    text = nlp_gait("list").stdout
+    assert "NAO, single support: least mean power" in text and "pymoo:" in text and "nao-v5" in text
+    assert as_json("list")["problems"]["nao-ssp"]["variables"] == 9
+
+
+def test_listing_imports_neither_casadi_nor_numpy() -> None:
+    code = (
+        "import sys; from compare.cli.list import _list_all; _list_all(); print({'numpy', 'casadi'} & {*sys.modules})"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
