@@ -28,13 +28,14 @@ from nlp_gait.errors import GaitError, UserCodeError, unknown
 from nlp_gait.files import check_path, make_writable_folder, read_bytes, write_bytes
 
 T = TypeVar("T")
-Kind = Literal["problem", "algorithm", "limit"]
+Kind = Literal["problem", "algorithm", "limit", "paper"]
 
 # Groups of entry points, for ``[project.entry-points."nlp_gait.problems"]`` of another package.
 GROUPS: Mapping[Kind, str] = {
     "problem": "nlp_gait.problems",
     "algorithm": "nlp_gait.algorithms",
     "limit": "nlp_gait.gait_limits",
+    "paper": "nlp_gait.papers",
 }
 ENDING = ".py"
 PROGRAM = "cmd:"

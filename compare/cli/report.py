@@ -85,7 +85,7 @@ def _parse_weights(text: str | None) -> Weighting:
 
 @command
 def reproduce(
-    paper: Annotated[str, Argument(metavar="PAPER", help=", ".join(REPRODUCTIONS))],
+    paper: Annotated[str, Argument(metavar="PAPER", help=f"{', '.join(REPRODUCTIONS)}, or FILE.py of your own")],
     out: Annotated[Path, Option(help=OUT), OUTPUT],
     quick: Annotated[bool, Option("--quick", help=QUICK)] = False,
     effort: Annotated[Path | None, Option(help=EFFORT)] = None,
@@ -93,7 +93,8 @@ def reproduce(
 ) -> Output:
     """Recompute a paper's tables and figures next to the printed ones, and check its claims.
 
-    `claims.csv` has every claim with its verdict, `differences.csv` what is not as printed, with its effect.
+    `claims.csv` has every claim with its verdict, `differences.csv` what is not as printed, with its effect. A paper of your own
+    is a module and a table of claims, see `examples/your_own_paper.py`.
 
     Examples: `nlp-gait reproduce nao --out reproduction`, `nlp-gait reproduce walk12 --quick --out quick`,
     `nlp-gait reproduce stairs --effort effort.json --out reduced`
@@ -105,7 +106,7 @@ def reproduce(
     if effort:
         chosen = read_dataclass(type(reproduction.full), effort, "effort", error=InputError)
     try:
-        with show_progress(paper, chosen.steps) as advance:
+        with show_progress(paper, None) as advance:
             reproduction.reproduce(
                 out, chosen, advance, command=describe_command(), on_outdated=say, scheduler=scheduler
             )

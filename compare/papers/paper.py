@@ -1,61 +1,35 @@
-"""The frame of the papers: a paper is a folder with tables in CSV and one module that computes their numbers.
+"""The frame of the papers: a paper is a module and a table of claims of the same name, ``mypaper.py`` and ``mypaper.csv``.
 
-``claims.csv`` has a row for each claim that can be tested, ``differences.csv`` one for each thing that is not as printed, and
-printed tables are CSV files beside them::
+A row of the table is a claim that can be tested::
 
     id,where,claim,printed,unit,rule,note
     power,Table 7,PSO's least power,1.283,W,within 5 %,at the printed solution
-    better,5.3.1,PSO needs less power than GA,,mW,p < 0.05,lead of the medians; rank-sum test of 11 runs
-    higher-hip,5.1,a higher hip needs less power,,W,falls,sweep of x1
+
+The rules are in ``compare.papers.rules``. The module names the readings of the paper, the literal one first, computes results for
+each of them, and binds a function to each claim, which returns our numbers. ``examples/your_own_paper.py`` is a complete one.
+
+Beside the module there may be ``differences.csv``, with a row for each thing that is not as printed, ``notes.md``, with what
+cannot be tested, and printed tables. The effect of a difference is a text in its row, or a function computes it::
 
     id,where,printed,here,option,effect
     gravity,(19),z'' - g with g = -9.8,z'' + 9.8,zmp_gravity=printed,
 
-The rules are in ``compare.papers.rules``. The module names the readings of the paper, the literal one first, computes results for
-each of them, and gives the numbers of every claim; what is not computed in a quick run is marked ``runs=True``::
-
-    BOOK = read_book("mypaper")
-
-    @BOOK.claim("power")
-    def measure_power(found: Results) -> float:            # results of one reading
-        return found.evaluate(PRINTED_X)["power_W"]
-
-    @BOOK.claim("better", runs=True)                       # None: no feasible result
-    def measure_lead(found: Results) -> Found:
-        return Found(1000 * (median(found.ga) - median(found.pso)), p=rank_sum(found.pso, found.ga))
-
-    @BOOK.effect("gravity")                                # a row of differences.csv without a text of its effect
-    def measure_gravity(results: Mapping[str, Results]) -> str:
-        return f"margins by {results['physical'].margin_mm - results['literal'].margin_mm:.1f} mm"
-
-    REPRODUCTION = Paper(
-        book=BOOK,                                         # raises for ids that only one side knows
-        title="...",
-        full=MyEffort(runs=11), quick=MyEffort(runs=0),    # without runs, claims on runs are "not run"
-        readings={"literal": "as printed", "physical": "..."},
-        run_readings={"constant": "...", "damped": "..."}, # of the claims on runs, if they differ
-        compute=compute,                                   # (runner, effort) -> results by reading of both kinds
-        headlines=("better", "power"),                     # at most ten
-        tables=make_tables, figure=draw, explain=explain,
-    )
-
-Claims may share a function: ``@BOOK.claim("power-ssp", phase="ssp")`` above ``@BOOK.claim("power-dsp", phase="dsp")``. The page
-shows headlines, tables, the figure and what is not explained; claims and differences are folded. The literal reading decides.
+The page shows headlines, then what ``show`` returns and the notes; claims and differences are folded, those first whose verdict
+depends on the reading. The literal reading decides.
 """
 
 from __future__ import annotations
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import partial
-from importlib import resources
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from compare.drawing.figures import use_style
-from compare.papers.paper_runs import Effort, Runner
+from compare.papers.paper_runs import Effort, Runner, tabulate_runs
 from compare.papers.rules import ClaimRow, Found, Ruling, decide, describe
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, make_text_table
 from compare.report.provenance import TERMS, format_settings, make_reference_table, make_solver_table
@@ -67,8 +41,8 @@ from nlp_gait.progress import Progress, ignore_progress
 
 E = TypeVar("E", bound=Effort)
 R = TypeVar("R")
-F = TypeVar("F", bound=Callable[..., Any])
 MOST_HEADLINES = 10
+SETTING = re.compile(r"(--set )?([\w.]+)=(\S+)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +55,35 @@ class DifferenceRow:
     here: str
     option: str  # that selects the printed choice
     effect: str  # in words; empty where a function computes it
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Options of the problem in ``option``."""
+        return parse_settings(self.option)[0]
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Parameters of the problem in ``option``, each after ``--set``."""
+        return parse_settings(self.option)[1]
+
+
+def parse_settings(text: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the options NAME=VALUE and the parameters --set NAME=VALUE in a text."""
+    options, values = dict[str, Any](), dict[str, Any]()
+    for flag, name, value in SETTING.findall(text):
+        (values if flag else options)[name] = _parse(value)
+    return options, values
+
+
+def _parse(text: str) -> str | int | float | bool:
+    if text in ("true", "false"):
+        return text == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,31 +98,26 @@ class Judgement:
 class Book:
     """Claims and differences of a paper, and the functions that compute their numbers."""
 
-    name: str  # of the folder
+    name: str
+    folder: Path
     claims: Mapping[str, ClaimRow]
     differences: Mapping[str, DifferenceRow]
     functions: dict[str, Callable[..., Any]] = field(default_factory=dict)
     on_runs: set[str] = field(default_factory=set)  # ids that a quick run leaves out
 
-    def claim(self, id: str, *, runs: bool = False, **arguments: Any) -> Callable[[F], F]:
-        """Return a decorator for the function that returns the numbers of a claim."""
-        return self._bind(id, self.claims, runs, arguments)
+    def bind(self, functions: Mapping[str, Callable[..., Any]], *, runs: bool = False) -> None:
+        """Name the functions that return the numbers of claims, by id, or the effects of differences.
 
-    def effect(self, id: str, *, runs: bool = False) -> Callable[[F], F]:
-        """Return a decorator for the function that returns the effect of a difference in words."""
-        return self._bind(id, self.differences, runs, {})
-
-    def _bind(self, id: str, known: Mapping[str, Any], runs: bool, arguments: Mapping[str, Any]) -> Callable[[F], F]:
-        if id not in known or id in self.functions:
-            raise KeyError(f"{self.name}: {id!r} is {'bound twice' if id in known else 'in no table'}")
-
-        def bind(function: F) -> F:
-            self.functions[id] = partial(function, **arguments)
-            if runs:
-                self.on_runs.add(id)
-            return function
-
-        return bind
+        Args:
+            functions: of a claim from the results of one reading, to values, ``Found``, or None without a feasible result; of a
+                difference from the results of all readings, to words, or numbers by name.
+            runs: they need runs of searches, which a quick run leaves out.
+        """
+        for id, function in functions.items():
+            if id in self.functions or id not in {**self.claims, **self.differences}:
+                raise KeyError(f"{self.name}: {id!r} is {'bound twice' if id in self.functions else 'in no table'}")
+            self.functions[id] = function
+        self.on_runs.update(functions if runs else ())
 
     def check(self) -> None:
         """Raise KeyError if a claim, or a difference without a text, has no function."""
@@ -127,21 +125,28 @@ class Book:
         if missing := [id for id in wanted if id not in self.functions]:
             raise KeyError(f"{self.name}: no function gives the numbers of {', '.join(missing)}")
 
+    @property
+    def notes(self) -> list[Part]:
+        """Paragraphs of ``notes.md`` beside the module."""
+        file = self.folder / "notes.md"
+        return [Prose(file.read_text(encoding="utf-8"))] if file.exists() else []
 
-def read_book(name: str) -> Book:
-    """Return the claims and differences of the paper in a folder beside this file."""
-    claims = [ClaimRow(**row) for row in read_table(name, "claims")]
-    differences = [DifferenceRow(**row) for row in read_table(name, "differences")]
-    book = Book(name, {row.id: row for row in claims}, {row.id: row for row in differences})
+
+def read_book(module: str) -> Book:
+    """Return the claims and differences of a paper from its module's file."""
+    file = Path(module)
+    claims = [ClaimRow(**row) for row in read_rows(file.with_suffix(".csv"))]
+    more = file.with_name("differences.csv")
+    differences = [DifferenceRow(**row) for row in read_rows(more)] if more.exists() else []
+    book = Book(file.stem, file.parent, {row.id: row for row in claims}, {row.id: row for row in differences})
     if len({*book.claims, *book.differences}) < len(claims) + len(differences):
-        raise ValueError(f"{name}: an id has two rows")
+        raise ValueError(f"{book.name}: an id has two rows")
     return book
 
 
-def read_table(name: str, table: str) -> list[dict[str, str]]:
-    """Return the rows of ``<table>.csv`` in the folder of a paper."""
-    text = (resources.files("compare.papers") / name / f"{table}.csv").read_text(encoding="utf-8")
-    return list(csv.DictReader(text.splitlines(), strict=True))
+def read_rows(file: Path) -> list[dict[str, str]]:
+    """Return the rows of a CSV file."""
+    return list(csv.DictReader(file.read_text(encoding="utf-8").splitlines(), strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,10 +161,7 @@ class Paper(Generic[E, R]):
     run_readings: Mapping[str, str] = field(default_factory=dict)  # of the claims on runs; empty: the same
     compute: Callable[[Runner, E], Mapping[str, R]]
     headlines: Sequence[str]  # ids of claims
-    tables: Callable[[Mapping[str, R]], Sequence[Table]]
-    figure: Callable[[Mapping[str, R]], Figure]
-    # What stays unexplained, and what cannot be tested and why, in Markdown
-    explain: Callable[[Mapping[str, R]], Sequence[str]]
+    show: Callable[[Mapping[str, R]], Sequence[Part]] = lambda results: ()  # sentences, tables and a figure
 
     def __post_init__(self) -> None:
         self.book.check()
@@ -168,7 +170,7 @@ class Paper(Generic[E, R]):
 
     @property
     def name(self) -> str:
-        """Name of the folder."""
+        """Name of the module."""
         return self.book.name
 
     def reproduce(
@@ -202,12 +204,13 @@ class Paper(Generic[E, R]):
         progress("figure, tables and report")
         judged = self.judge(results, effort)
         label = "full" if effort == self.full else "quick" if effort == self.quick else "reduced"
-        parts = self._make_parts(results, judged, effort)
+        parts = self._make_parts(results, judged, effort, runner)
+        verdicts = {id: {name: str(one.verdict) for name, one in row.items()} for id, row in judged.items()}
         record = {
             "effort": label,
             "settings": {k: v for k, v in asdict(effort).items() if v != getattr(self.full, k)},
             "session": asdict(session),
-            "verdicts": {id: {reading: str(one.verdict) for reading, one in row.items()} for id, row in judged.items()},
+            "verdicts": verdicts,
             "parts": [encode_part(part) for part in parts if not isinstance(part, Figure)],
         }
         write_json(folder / "summary.json", record)
@@ -219,7 +222,8 @@ class Paper(Generic[E, R]):
         )
         cited = make_citation_section(record.inputs.problem for record in runner.records)
         title = self.title if label == "full" else f"{self.title} ({label})"
-        write_document(folder, Document(title=title, headline=[count_verdicts(judged)], parts=(*parts, ending, cited)))
+        headline = [count_verdicts(verdicts)]
+        write_document(folder, Document(title=title, headline=headline, parts=(*parts, ending, cited)))
         return record
 
     def judge(self, results: Mapping[str, R], effort: E) -> dict[str, dict[str, Judgement]]:
@@ -241,21 +245,22 @@ class Paper(Generic[E, R]):
         return Judgement(decide(claim, found), describe(claim, found))
 
     def _make_parts(
-        self, results: Mapping[str, R], judged: Mapping[str, Mapping[str, Judgement]], effort: E
+        self, results: Mapping[str, R], judged: Mapping[str, Mapping[str, Judgement]], effort: E, runner: Runner
     ) -> list[Part]:
         with use_style():
-            figure = self.figure(results)
+            shown = self.show(results)
         own = [id for id in self.book.claims if id not in self.book.on_runs]
         runs = [id for id in self.book.claims if id in self.book.on_runs]
-        return [
-            self._tabulate_headlines(judged),
-            *map(Prose, self.explain(results)),
-            *self.tables(results),
-            figure,
-            self._fold("Claims decided by computation", own, judged),
-            self._fold("Claims decided by runs of the searches", runs, judged),
-            Section(title="What is not as printed", parts=(self._tabulate_differences(results, effort),), folded=True),
+        folded = [
+            *self._fold("claims", "Claims decided by computation", own, judged),
+            *self._fold("claims-on-runs", "Claims decided by runs of the searches", runs, judged),
         ]
+        if self.book.differences:
+            parts = (self._tabulate_differences(results, effort),)
+            folded.append(Section(title="What is not as printed", parts=parts, folded=True))
+        if effort.runs:
+            folded.append(Section(title="Runs", parts=(tabulate_runs(runner.records),), folded=True))
+        return [self._tabulate_headlines(judged), *shown, *self.book.notes, *folded]
 
     def _tabulate_headlines(self, judged: Mapping[str, Mapping[str, Judgement]]) -> Table:
         rows = []
@@ -269,14 +274,18 @@ class Paper(Generic[E, R]):
         headings = ("claim", "printed", "here", "verdict", "holds in")
         return Table(name="headlines", columns=dict.fromkeys(headings, ""), rows=rows, prose=True)
 
-    def _fold(self, title: str, ids: Sequence[str], judged: Mapping[str, Mapping[str, Judgement]]) -> Section:
-        readings = self._list_readings(ids[0]) if ids else {}
-        rows = []
-        for id in ids:
+    def _fold(
+        self, name: str, title: str, ids: Sequence[str], judged: Mapping[str, Mapping[str, Judgement]]
+    ) -> list[Section]:
+        """Return a folded table of claims, those first whose verdict depends on the reading; nothing without claims."""
+        if not ids:
+            return []
+        rows, readings = [], self._list_readings(ids[0])
+        for id in sorted(ids, key=lambda id: len({one.verdict for one in judged[id].values()}) == 1):
             claim = self.book.claims[id]
             cells = [f"{one.verdict}: {one.here}" if one.here else str(one.verdict) for one in judged[id].values()]
             rows.append((claim.where, claim.claim, _add_unit(claim), claim.rule, claim.note, *cells))
-        headings = (
+        columns = (
             "where",
             "claim",
             "printed",
@@ -284,29 +293,28 @@ class Paper(Generic[E, R]):
             "what is compared",
             *(f"reading: {label}" for label in readings),
         )
-        name = "claims" if title.endswith("computation") else "claims-on-runs"
-        table = Table(name=name, columns=dict.fromkeys(headings, ""), rows=rows, prose=True)
+        table = Table(name=name, columns=dict.fromkeys(columns, ""), rows=rows, prose=True)
         words = "\n".join(f"- *{label}*: {sentence}" for label, sentence in readings.items())
-        return Section(title=title, parts=(Prose(words), table), folded=True)
+        return [Section(title=title, parts=(Prose(words), table), folded=True)]
 
     def _tabulate_differences(self, results: Mapping[str, R], effort: E) -> Table:
         rows = []
         for row in self.book.differences.values():
             run = effort.runs or row.id not in self.book.on_runs
             effect = row.effect or (self.book.functions[row.id](results) if run else str(Ruling.NOT_RUN))
+            if not isinstance(effect, str):
+                words = {name: value if isinstance(value, str) else f"{value:.4g}" for name, value in effect.items()}
+                effect = "; ".join(f"{name}: {value}" for name, value in words.items())
             rows.append((row.where, row.printed, row.here, row.option, effect))
         headings = ("where", "printed", "here", "option", "effect")
         return Table(name="differences", columns=dict.fromkeys(headings, ""), rows=rows, prose=True)
 
 
-def count_verdicts(judged: Mapping[str, Mapping[str, Judgement]]) -> str:
-    """Return a sentence with the number of claims by verdict in the literal reading."""
-    counts = Counter(next(iter(row.values())).verdict for row in judged.values())
-    return (
-        f"{len(judged)} claims, in the literal reading: "
-        + ", ".join(f'{n} "{word}"' for word, n in counts.items())
-        + "."
-    )
+def count_verdicts(verdicts: Mapping[str, Mapping[str, str]]) -> str:
+    """Return a sentence with the number of claims by verdict in the literal reading, from the verdicts of ``summary.json``."""
+    counts = Counter(next(iter(row.values())) for row in verdicts.values())
+    words = ", ".join(f'{n} "{word}"' for word, n in counts.most_common())
+    return f"{len(verdicts)} claims, in the literal reading: {words}."
 
 
 def encode_part(part: Part) -> dict[str, Any]:

@@ -2,22 +2,25 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
-from itertools import product
+from functools import cache, partial
+from itertools import count, product
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from compare.report.document import Table, Value
 from compare.study.record import RunRecord
 from compare.study.record_files import locate_record
 from compare.study.run_study import Study, run_study
 from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from metaheuristics.interface import Algorithm
+from nlp_gait.backends.exact import ExactModel, build_exact_model
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.errors import InputError
+from nlp_gait.formulation import GaitProblem
 from nlp_gait.progress import Progress, ignore_progress
 
 Runs = dict[tuple[str, str], list[RunRecord]]
@@ -26,14 +29,9 @@ Runs = dict[tuple[str, str], list[RunRecord]]
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
-    """How much a reproduction computes; each one adds its numbers of evaluations and so on."""
+    """How much a reproduction computes; a paper adds its numbers of evaluations and so on."""
 
     runs: int = 0  # of each search; without any, claims on runs have no verdict
-
-    @property
-    def steps(self) -> int | None:
-        """Number of calls of progress; None if it is not known before."""
-        return None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,16 +52,11 @@ class Runner:
             InputError: a run failed before it had a point.
         """
         study = Study(tasks=tuple(tasks), folder=self.folder, jobs=self.jobs, scheduler=self.scheduler)
-
-        def report_stored(count: int) -> None:
-            for _ in range(count):
-                self.progress("stored by an earlier run")
-
-        runs: Runs = {}
+        finished, runs = count(1), Runs()
         records = run_study(
             study,
-            lambda task, _: self.progress(f"{task.problem.title}, {task.title} {task.run}"),
-            report_stored,
+            lambda task, _: self.progress(f"{next(finished)}: {task.problem.title}, {task.title} {task.run}"),
+            lambda stored: self.progress(f"{len(study.tasks)} runs, {stored} of them stored by an earlier call"),
             self.on_outdated,
         )
         for task, record in zip(study.tasks, records, strict=True):
@@ -103,6 +96,48 @@ def make_search_tasks(problem: ProblemSpec, algorithms: Mapping[str, Algorithm],
     stop = Stop(evaluations=budget)
     searches = product(algorithms.items(), range(runs))
     return [Task(problem=problem, solver=solver, label=label, stop=stop, run=k) for (label, solver), k in searches]
+
+
+@cache
+def _build(name: str | GaitProblem, options: tuple[tuple[str, Any], ...]) -> tuple[GaitProblem, ExactModel]:
+    problem = ProblemSpec(name=name, options=dict(options)).load()
+    return problem, build_exact_model(problem)
+
+
+@cache
+def _evaluate(name: str | GaitProblem, options: Any, values: Any, x: tuple[float, ...]) -> Mapping[str, float]:
+    problem, model = _build(name, options)
+    point = model.at(problem.check_x(x), problem.with_values(**dict(values)).p)
+    return {problem.objective.name: problem.objective.sign * point.cost, **point.indexes}
+
+
+def evaluate_point(spec: ProblemSpec, x: Sequence[float]) -> Mapping[str, float]:
+    """Return objective and performance indexes at x (n,) by the exact functions, which are built once for equal options."""
+    return _evaluate(spec.name, *(tuple(sorted(part.items())) for part in (spec.options, spec.values)), tuple(x))
+
+
+def tabulate(name: str, caption: str, rows: Sequence[Mapping[str, Value]]) -> Table:
+    """Return a table of rows by heading, numbers to four digits."""
+    return Table(
+        name=name, columns=dict.fromkeys(rows[0], ".4g"), rows=[[*row.values()] for row in rows], caption=caption
+    )
+
+
+def tabulate_runs(records: Iterable[RunRecord]) -> Table:
+    """Return how the runs of each solver end, on problems with runs of a search."""
+    groups: dict[tuple[str, str], list[RunRecord]] = {}
+    for record in records:
+        groups.setdefault((record.problem, record.solver), []).append(record)
+    searched = {problem for problem, solver in groups if solver != IPOPT}
+    rows = list[Mapping[str, Value]]()
+    for (problem, solver), runs in sorted(groups.items()):
+        if problem in searched:
+            ends = [run.verdict.objective for run in runs if run.verdict.feasible]
+            least, median, largest = np.percentile(ends, (0, 50, 100)).tolist() if ends else (None, None, None)
+            row: dict[str, Value] = {"problem": problem, "solver": solver, "runs": len(runs), "feasible": len(ends)}
+            row |= {"least": least, "median": median, "largest": largest, "unit": runs[0].inputs.objective.unit}
+            rows.append(row)
+    return tabulate("runs", "Objective at the ends of the runs", rows)
 
 
 def choose_best(records: Iterable[RunRecord]) -> RunRecord:

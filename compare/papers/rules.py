@@ -5,10 +5,11 @@ A rule is one of
 - ``within A %`` of the printed values, ``within A UNIT`` in the unit of the row; printed values with a sign are changes: if only
   the signs are the printed ones, the size differs;
 - ``rises``, ``falls`` all along a series, optionally by at least ``A %`` of its first value, or ``A UNIT``, from first to last;
-- ``p < A``: the value, positive in the claimed direction, and the two-sided p-value of a test, which has to exclude chance;
+- ``p < A``: the value, positive in the claimed direction, and the two-sided p-value of a test, which has to exclude chance (the
+  median of those of repeated tests);
 - ``at least A UNIT``, ``at most A UNIT``: every value;
 - ``same order``: our values have the order of the printed ones;
-- ``rank``: the printed value lies within those of our runs. Beyond them by less than their own range it is not excluded.
+- ``rank``: the printed values lie within those of our runs. Beyond them by less than their own range one is not excluded.
 """
 
 from __future__ import annotations
@@ -38,10 +39,10 @@ class Ruling(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Our numbers: values, series of values (k, n), or the final values of runs, and the two-sided p-value of a test."""
+    """Our numbers: values, series (k, n), or the final values of runs (k, n), and the two-sided p-values of a test (m,)."""
 
     values: Any
-    p: float | None = None
+    p: Any = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,11 +99,11 @@ def decide(claim: ClaimRow, found: Found | None) -> Ruling:
     if kind == "p <":
         if found.p is None:
             raise ValueError(f"{claim.id}: its rule needs a p-value")
-        return _say(bool(np.all(ours > 0))) if found.p < size else Ruling.NOT_SHOWN
+        return _say(bool(np.all(ours > 0))) if np.median(found.p) < size else Ruling.NOT_SHOWN
     if kind == "same order":
         return _say(np.array_equal(np.argsort(ours, kind="stable"), np.argsort(claim.values, kind="stable")))
     if kind == "rank":
-        return _judge_rank(float(claim.values[0]), ours)
+        return _judge_ranks(claim.values, np.atleast_2d(ours))
     slack = ROUNDING * abs(size)
     return _say(bool(np.all(ours >= size - slack if kind == "at least" else ours <= size + slack)))
 
@@ -118,11 +119,11 @@ def _compare(claim: ClaimRow, ours: np.ndarray[Any, Any], size: float, *, relati
     return Ruling.SIZE_DIFFERS if signed and (np.sign(ours) == np.sign(printed)).all() else Ruling.FAILS
 
 
-def _judge_rank(printed: float, runs: np.ndarray[Any, Any]) -> Ruling:
-    beyond = max(runs.min() - printed, printed - runs.max())
-    if beyond <= 0:
+def _judge_ranks(printed: np.ndarray[Any, Any], runs: np.ndarray[Any, Any]) -> Ruling:
+    beyond = np.maximum(runs.min(axis=1) - printed, printed - runs.max(axis=1))
+    if (beyond <= 0).all():
         return Ruling.HOLDS
-    return Ruling.NOT_SHOWN if beyond <= np.ptp(runs) else Ruling.FAILS
+    return Ruling.NOT_SHOWN if (beyond <= np.ptp(runs, axis=1)).all() else Ruling.FAILS
 
 
 def _say(holds: bool) -> Ruling:
@@ -135,13 +136,17 @@ def describe(claim: ClaimRow, found: Found | None) -> str:
         return "no feasible result"
     values = np.asarray(found.values, dtype=float)
     if claim.parts[0] == "rank":
-        rank = int((values < claim.values[0]).sum())
-        text = f"{values.min():.4g} to {values.max():.4g}{_space(claim.unit)}, rank {rank} of {values.size}"
-    else:
-        signed = claim.printed[:1] in ("+", "-") and claim.parts[0] == "within"
-        rows = [_join(row, signed) for row in np.atleast_2d(values)]
-        text = "; ".join(rows) + _space(claim.unit)
-    return text if found.p is None else f"{text}, p = {found.p:.2g}"
+        rows = np.atleast_2d(values)
+        ranks = " / ".join(str((row < printed).sum()) for row, printed in zip(rows, claim.values, strict=True))
+        ends = "; ".join(f"{row.min():.4g} to {row.max():.4g}" for row in rows)
+        return f"{ends}{_space(claim.unit)}; {ranks} of {rows.shape[1]} runs below"
+    signed = claim.printed[:1] in ("+", "-") and claim.parts[0] == "within"
+    text = "; ".join(_join(row, signed) for row in np.atleast_2d(values)) + _space(claim.unit)
+    if found.p is None:
+        return text
+    tests = np.atleast_1d(found.p)
+    spread = f" ({tests.min():.2g} to {tests.max():.2g} in {tests.size} tests)" if tests.size > 1 else ""
+    return f"{text}, p = {np.median(tests):.2g}{spread}"
 
 
 def _join(row: Sequence[float], signed: bool) -> str:

@@ -1,4 +1,4 @@
-"""A page for each paper, from the reproductions that ``python -m benchmarks.papers PAPER`` records in ``docs/papers``."""
+"""Tables of each paper's page, from the reproductions that ``python -m benchmarks.papers PAPER`` records in ``docs/papers``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from compare.papers import REPRODUCTIONS
+from compare.papers import REPRODUCTIONS, load_reproduction
+from compare.papers.paper import count_verdicts
 from compare.study.citations import find_citations
 from docs.pages.markdown import literal, page, table, write_all
 
@@ -15,24 +16,36 @@ RECORDS = Path(__file__).parents[1] / "papers"
 
 
 def write(folder: Path) -> None:
-    """Write the tables of each paper, and what to cite, which ``docs/papers.md`` includes."""
+    """Write the tables of each paper, the list of papers, and what to cite, which the pages include."""
     entries = "\n\n".join(find_citations())
     pages = {f"{name}.md": paper_page(name) for name in REPRODUCTIONS}
-    write_all(folder / "papers", {**pages, "citations.md": page(f"```text\n{entries}\n```")})
+    write_all(folder / "papers", {**pages, "index.md": list_page(), "citations.md": page(f"```text\n{entries}\n```")})
+
+
+def read_record(name: str) -> dict[str, Any]:
+    """Return the recorded reproduction of a paper."""
+    record: dict[str, Any] = json.loads((RECORDS / f"{name}.json").read_text(encoding="utf-8"))
+    return record
+
+
+def list_page() -> str:
+    """Return the table of papers with their verdicts."""
+    rows = [
+        [f"[{load_reproduction(name).title}](papers/{name}.md)", literal(count_verdicts(read_record(name)["verdicts"]))]
+        for name in REPRODUCTIONS
+    ]
+    return page(table(["paper", "verdicts"], rows))
 
 
 def paper_page(name: str) -> str:
     """Return the tables of a paper."""
-    record = json.loads((RECORDS / f"{name}.json").read_text(encoding="utf-8"))
-    words = f"Computed by `{record['session']['command']}`, {_describe_origin(record)}"
-    return page(literal(words), *_format_parts(record["parts"]))
-
-
-def _describe_origin(record: dict[str, Any]) -> str:
+    record = read_record(name)
     session = record["session"]
-    return (
-        f"version {session['versions']['nlp-gait']}, on {session['started'][:10]}, {session['machine']['processor']}."
+    words = (
+        f"Computed by `{session['command']}`, version {session['versions']['nlp-gait']}, on {session['started'][:10]}, "
+        f"{session['machine']['processor']}."
     )
+    return page(literal(count_verdicts(record["verdicts"])), *_format_parts(record["parts"]), literal(words))
 
 
 def _format_parts(parts: Iterable[dict[str, Any]]) -> list[str]:

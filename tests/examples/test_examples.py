@@ -7,14 +7,18 @@ long ones with fewer points, runs or starts.
 from __future__ import annotations
 
 import ast
+import json
 import runpy
+import shutil
 import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
 from matplotlib.figure import Figure
+from typer.testing import CliRunner
 
+from compare.cli import app
 from compare.study.run_study import Study, check_study
 from compare.study.run_task import run_task
 from compare.study.settings import read_settings
@@ -30,6 +34,7 @@ EXPECTED = {
     "your_own_limit.py": "1.4 rad/s: 2.3059 W, converged",
     "your_own_problem.py": "5 of 5 starts of ipopt converged",
     "your_own_algorithm.py": "| shrinking-box | 2/2 |",
+    "your_own_paper.py": '3 claims, in the literal reading: 2 "holds", 1 "not run".',
     "results_from_matlab.py": "paper (MATLAB): 2 of 2 feasible, claims 1.0682 W, judged 0.6265 W at best",
     "custom_robot.py": "nao-with-a-load: 0 kg, 0.845869 W",
     "export_motion.py": "gait.motion: 102 lines",
@@ -73,11 +78,28 @@ def test_example(
     text, (many, few) = (ROOT / "examples" / name).read_text(encoding="utf-8"), FEWER.get(name, ("", ""))
     assert not many or text.count(many) == 1
     (tmp_path / name).write_text(text.replace(many, few), encoding="utf-8")
+    for table in (ROOT / "examples").glob(f"{Path(name).stem}.csv"):
+        shutil.copy(table, tmp_path)
+    monkeypatch.syspath_prepend(ROOT / "examples")
     found = runpy.run_path(str(tmp_path / name), run_name="__main__")
     printed = capsys.readouterr().out
     assert EXPECTED[name] in printed
     assert isinstance(found["figure"], Figure) and found["figure"].axes
     plt.close("all")
+
+
+@pytest.mark.slow
+def test_a_paper_of_two_files_is_reproduced_by_the_command(tmp_path: Path) -> None:
+    """From any folder that has both files, with its searches."""
+    for name in ("your_own_paper.py", "your_own_paper.csv", "your_own_problem.py"):
+        shutil.copy(ROOT / "examples" / name, tmp_path)
+    done = CliRunner().invoke(app, ["reproduce", str(tmp_path / "your_own_paper.py"), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    record = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert record["verdicts"] == {id: {"as printed": "holds"} for id in ("power", "faster", "better")}
+    assert {"report.html", "speeds.svg", "claims.csv", "runs.csv"} <= {
+        path.name for path in (tmp_path / "out").iterdir()
+    }
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -202,7 +203,7 @@ def test_reproduce_reports_its_stored_results(tmp_path: Path, monkeypatch: pytes
             [Computation(name="two", inputs={}, function=lambda: signal.raise_signal(signal.SIGINT))], code=()
         )
 
-    module = sys.modules[load_reproduction("nao").compute.__module__]
+    module = import_module("compare.papers.nao.nao")
     monkeypatch.setattr(module, "REPRODUCTION", replace(load_reproduction("nao"), compute=run_two))
     done = run("reproduce", "nao", "--out", str(tmp_path))
     assert f"1 finished results are stored in {tmp_path}; rerun the command to continue" in done.stderr

@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from compare.judge import evaluate
-from compare.papers.paper import read_table
+from compare.papers.paper import read_rows
 from compare.study.task import ProblemSpec
 from nlp_gait.formulation import Array, Result, Signals
 from nlp_gait.formulation.display import LEFT, RIGHT
@@ -55,15 +55,16 @@ class Case:
         return {"stair_length_m": self.stair_length_m, "rise_run_ratio": self.rise_run_ratio}
 
 
-TABLE_3 = {row["parameter"]: float(row["value"]) for row in read_table("stairs", "table_3")}
+FOLDER = Path(__file__).parent
+TABLE_3 = {row["parameter"]: float(row["value"]) for row in read_rows(FOLDER / "table_3.csv")}
 TABLE_4 = {
     int(row.pop("case")): Case(**{name: float(value) for name, value in row.items()})
-    for row in read_table("stairs", "table_4")
+    for row in read_rows(FOLDER / "table_4.csv")
 }
 
 
-def measure_equations(case: Case) -> dict[str, float]:
-    """Return by how much the printed equations miss in a case, with the values of Table III."""
+def measure_equations(case: Case) -> dict[str, dict[str, float]]:
+    """Return by how much the printed equations miss in a case, with the values of Table III, by the id of the difference."""
     robot, (tread, rise) = load_toe_foot_biped(), case.step_m
     names = ("t1_s", "t2_s", "t_bc_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")
     t1, t2, t_bc, sole, toe, catch = (TABLE_3[name] for name in names)
@@ -83,15 +84,23 @@ def measure_equations(case: Case) -> dict[str, float]:
         [angle * (offset + 12 * u - 9 * u**2 + 2 * u**3) for u in (t1 / (t2 - t1), t2 / (t2 - t1))]
         for angle, offset in ((sole, -4), (toe, -5))
     )
+    bridge = np.linalg.norm((weights - weights * [1, 3, 3, 1]) @ points, axis=1).max()  # (10), (11)
     return {
-        "sole_jump_deg": math.degrees(sixth[0] - sole),  # (eq. 3) at t1
-        "sole_end_deg": math.degrees(sixth[1]),  # at t2, where the sole should be level
-        "toe_end_deg": math.degrees(seventh[1]),  # (eq. 4) at t2, where it should be theta_b
-        "bridge_mm": 1e3
-        * float(np.linalg.norm((weights - weights * [1, 3, 3, 1]) @ points, axis=1).max()),  # (10), (11)
-        "lift_off_m_s": 3 * float(np.linalg.norm(points[1] - points[0])) / (t_bc - t2),
-        "landing_m_s": 2 * rise * math.sqrt(GRAVITY / rise),
-        "arc_m": tread / math.sin(2 * math.atan2(rise, tread)),  # (eq. 25)
+        "foot-angles": {
+            "jump of the sole at t1 [degrees]": math.degrees(sixth[0] - sole),  # (eq. 3)
+            "sole at t2, level in print [degrees]": math.degrees(sixth[1]),
+            f"toe at t2, {math.degrees(toe):.0f} in print [degrees]": math.degrees(seventh[1]),  # (eq. 4)
+        },
+        "bezier": {
+            "curve off by up to [mm]": 1e3 * float(bridge),
+            "jump of the ankle's speed at t2 [m/s]": 3 * float(np.linalg.norm(points[1] - points[0])) / (t_bc - t2),
+        },
+        "arc": {"hip above its place [m]": tread / math.sin(2 * math.atan2(rise, tread))},  # (eq. 25)
+        "flat-stairs": {
+            "ankle inside a step of 10 cm on 30 cm [mm]": measure_slide(0.30, 0.10),
+            "inside one of Table IV [mm]": max(measure_slide(*row.step_m) for row in TABLE_4.values()),
+        },
+        "end-rate": {"landing of the ankle [m/s]": 2 * rise * math.sqrt(GRAVITY / rise)},
     }
 
 
@@ -208,8 +217,3 @@ def describe_climb(climb: Mapping[str, float | None]) -> str:
     landing, risen = climb["landing_%"] or 0.0, climb["risen_%"] or 0.0
     words = "climbs" if landing < LANDED and risen > RISEN else "stays up, but does not climb"
     return f"{words}: lands {landing:.0f} % of a tread off, the hip rises by {risen:.0f} % of the rise"
-
-
-def follow_printed_gains(spec: ProblemSpec, case: Case) -> float:
-    """Return the largest error of a tracked step with the gains and the torso pitch of Table IV [rad]."""
-    return float(evaluate(spec.load(), [case.kp, case.kd, case.torso_pitch_rad]).indexes["largest_error_rad"])

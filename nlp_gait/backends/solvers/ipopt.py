@@ -170,6 +170,10 @@ class Ipopt(Solver):
         warm |= {f"ipopt.warm_start_{what}_push": 1e-6 for what in ("bound", "slack_bound", "mult_bound")}
         warm["ipopt.warm_start_init_point"] = "yes"
         self.warm = ca.nlpsol("warm", "ipopt", nlp, {**options, **derivatives, **warm})
+        # Narrower sigmoids start close to a feasible point: a larger barrier throws samples over the jump, to a worse local optimum.
+        near: dict[str, Any] = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": WARM_BARRIER}
+        near |= {f"ipopt.{what}": 1e-6 for what in ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")}
+        self.near = ca.nlpsol("near", "ipopt", nlp, {**options, **derivatives, **near}) if model.smoothed else self.warm
         self.cold: ca.Function | WorkingSet = all_rows
         if settings.few_rows and nlp["g"].shape[0] >= LEAST_ROWS:
             self.cold = self._make_working_set(problem, general, all_rows)
@@ -244,8 +248,8 @@ class Ipopt(Solver):
                 break
             if width >= guess.width:
                 continue
-            # With its multipliers a feasible point is often thrown over the jump, to a worse local optimum.
-            method, start = (self.cold, {"x0": guess.primal}) if feasible else (self.warm, _start_from(guess))
+            # With its multipliers a feasible point is often thrown over the jump, too.
+            method, start = (self.near, {"x0": guess.primal}) if feasible else (self.warm, _start_from(guess))
             next_guess = self._run_stage(run, method, width, start)
             narrower = self._judge(run, next_guess)
             if not feasible or (narrower.converged and narrower.cost < outcome.cost):

@@ -9,7 +9,6 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.papers import REPRODUCTIONS, load_reproduction
 
 RUN = CliRunner()
 
@@ -26,8 +25,3 @@ def test_sweep_writes_table_and_picture(tmp_path: Path) -> None:
     rows = list(csv.DictReader(written[".csv"].read_text().splitlines()))
     assert [float(row["objective"]) for row in rows] == [point["objective"] for point in result["points"]]
     assert written.keys() >= {".svg", ".html"} and all(path.stat().st_size > 0 for path in written.values())
-
-
-def test_every_reproduction_knows_its_steps() -> None:
-    for name in REPRODUCTIONS:
-        assert load_reproduction(name).full.steps

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from compare.papers.paper import Book
+from compare.papers.paper import Book, parse_settings
 from compare.papers.rules import ClaimRow, Found, decide, describe
 
 
@@ -35,6 +36,10 @@ def make_claim(rule: str, printed: str = "", unit: str = "") -> ClaimRow:
         ("rank", "1.283", "W", [1.2, 1.3, 1.25], "holds"),
         ("rank", "1.35", "W", [1.2, 1.3, 1.25], "not shown"),
         ("rank", "1.283", "W", [0.86, 0.87], "does not hold"),
+        ("rank", "1.2 / 3.0", "W", [[1.0, 1.3], [2.9, 3.1]], "holds"),
+        ("rank", "1.2 / 3.2", "W", [[1.0, 1.3], [2.9, 3.1]], "not shown"),
+        ("rank", "1.2 / 4.0", "W", [[1.0, 1.3], [2.9, 3.1]], "does not hold"),
+        ("p < 0.05", "", "mW", Found(2.0, p=[0.001, 0.06, 0.3]), "not shown"),
         ("at least 1 W", "", "W", None, "not shown"),
         ("at least 1 W", "", "W", float("nan"), "not shown"),
     ],
@@ -52,17 +57,31 @@ def test_a_rule_that_cannot_decide_is_refused(rule: str) -> None:
 
 def test_a_cell_shows_numbers_with_their_unit() -> None:
     assert describe(make_claim("within 5 %", "+1 / +2", "mm"), Found([1.0, 2.25])) == "+1 / +2.25 mm"
-    assert describe(make_claim("rank", "2", "W"), Found([1.0, 3.0])) == "1 to 3 W, rank 1 of 2"
-    assert describe(make_claim("p < 0.05", "", "mW"), Found(0.5, p=0.012)) == "0.5 mW, p = 0.012"
+    assert describe(make_claim("rank", "2", "W"), Found([1.0, 3.0])) == "1 to 3 W; 1 of 2 runs below"
+    assert (
+        describe(make_claim("rank", "2 / 4", ""), Found([[1.0, 3.0], [5.0, 6.0]]))
+        == "1 to 3; 5 to 6; 1 / 0 of 2 runs below"
+    )
+    claim = make_claim("p < 0.05", "", "mW")
+    assert describe(claim, Found(0.5, p=0.012)) == "0.5 mW, p = 0.012"
+    assert describe(claim, Found(0.5, p=[0.2, 0.001, 0.01])) == "0.5 mW, p = 0.01 (0.001 to 0.2 in 3 tests)"
 
 
 def test_an_id_on_one_side_only_is_refused() -> None:
-    book = Book("made-up", {"one": make_claim("falls")}, {})
+    book = Book("made-up", Path(), {"one": make_claim("falls")}, {})
     with pytest.raises(KeyError, match="one"):
         book.check()
     with pytest.raises(KeyError, match="two"):
-        book.claim("two")
-    book.claim("one")(lambda found: [2.0, 1.0])
+        book.bind({"two": lambda found: 1.0})
+    book.bind({"one": lambda found: [2.0, 1.0]})
     book.check()
     with pytest.raises(KeyError, match="twice"):
-        book.claim("one")
+        book.bind({"one": lambda found: 1.0})
+
+
+def test_an_option_of_a_difference_is_read_as_on_the_command_line() -> None:
+    assert parse_settings("base=hip limit=false masses=23 --set kp.upper=100.0") == (
+        {"base": "hip", "limit": False, "masses": 23},
+        {"kp.upper": 100.0},
+    )
+    assert parse_settings("GeneticAlgorithm in Python") == ({}, {})

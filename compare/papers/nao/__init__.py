@@ -1,1 +1,0 @@
-"""Gupta, Pratihar, Deb (2023): NAO's single and double support."""

@@ -1,1 +1,0 @@
-"""A biped on stairs: planned, tracked and ideal."""

@@ -1,0 +1,226 @@
+"""Results of the stairs paper: plans, tracked steps by reading, and computations on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from compare.judge import evaluate
+from compare.papers.paper import DifferenceRow, parse_settings, read_rows
+from compare.papers.paper_runs import (
+    Effort,
+    Runner,
+    Runs,
+    choose_best,
+    get_point,
+    make_computation,
+    make_search_tasks,
+    make_start_tasks,
+)
+from compare.papers.stairs import printed
+from compare.papers.stairs.printed import FOLDER, TABLE_3, TABLE_4
+from compare.study.record import RunRecord
+from compare.study.store import Computation
+from compare.study.task import IPOPT, ProblemSpec, Task
+from metaheuristics import AntColony, minimize
+from nlp_gait.backends.kernel.compiled import compile_objective
+from nlp_gait.formulation import Assembly, Point
+from nlp_gait.gaits.stairs.track import PLAN
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+PLANS = {"least jerk": "jerk", "least energy": "energy"}  # readings of claims on plans
+INDEXES = {"jerk": ("peak_jerk_rad_s3", "rad/s³"), "energy": ("energy_J", "J")}
+TRACKINGS = {row["name"]: row for row in read_rows(FOLDER / "readings.csv")}  # of the tracked step
+LITERAL = "as printed"
+DRAWN_CASE = 2
+# Choices of the planner that are undone one by one: their options are in differences.csv.
+CHOICES = {
+    row["id"]: DifferenceRow(**row)
+    for row in read_rows(FOLDER / "differences.csv")
+    if row["id"] in ("end-rate", "straight", "torso", "times", "shanks", "hull", "edges")
+}
+ANTS, ITERATIONS = 30, 100  # Table IV
+COLONY = AntColony(population=ANTS, spread=0.7)  # of the printed evaporation; the paper defines none for real numbers
+NETWORK_RATES = {
+    "1e-4, lengths in m": (1e-4, 1.0),
+    "1e-4, lengths in cm": (1e-4, 100.0),
+    "0.3, lengths in m": (0.3, 1.0),
+}
+# Fast for one solve from near the optimum; compiled and with exact derivatives a plan takes twice as long.
+NEAR_OPTIMUM = {"compiled": False, "hessian": "limited-memory"}
+TRACK_START = {"kp": 40.0, "kd": 6.0, "torso_pitch_rad": 1.58}
+HIP_M = TABLE_3["hip_height_m"]
+NO_LIMITS = {"acceleration_limit_rad_s2": 1e6, "zmp_margin_m": 0.0, "clearance_m": 0.0, "friction": 100.0}
+NO_LIMITS |= {
+    "least_stance_force_N": 0.0,
+    "reach_margin": 1e-4,
+    "hip_height_m.lower": HIP_M,
+    "hip_height_m.upper": HIP_M,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class StairsEffort(Effort):
+    """Effort of the reproduction."""
+
+    runs: int = 3  # of the colony on each reading of the tracked step
+    evaluations: int = ANTS * ITERATIONS  # of a run, as in the paper
+    starts: int = 2  # of IPOPT on each plan, one of them near our best known plan; of the printed hip height
+    poses: int = 350  # of the network, every 0.01 s
+    track_s: float = 3.5  # of the tracked steps that IPOPT solves
+    track_cases: tuple[int, ...] = tuple(TABLE_4)  # that IPOPT solves, in the literal reading
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StairsResults:
+    """Results in one reading."""
+
+    plan: str  # "jerk" or "energy"
+    runs: Runs
+    computed: Mapping[str, Any]  # by name
+    tracking: str = ""  # reading of the tracked step
+
+    def best(self, case: int) -> RunRecord:
+        """Return our best plan of a case."""
+        return choose_best(self.runs[f"{self.plan}-{case}", IPOPT])
+
+    def list_plans(self, name: str) -> list[float]:
+        """Return a variable of the plans of all cases."""
+        return [self.best(case).x[name] for case in TABLE_4]
+
+    @cached_property
+    def motions(self) -> dict[int, tuple[Any, dict[str, Any]]]:
+        """Motions of the plans by case, see ``move``."""
+        return {case: printed.move(make_plan_spec(self.plan, case), self.best(case).x) for case in TABLE_4}
+
+    @cached_property
+    def peaks(self) -> list[tuple[float, float]]:
+        """Largest acceleration [rad/s^2] and jerk [rad/s^3] by case."""
+        plans = [(case, self.best(case).x) for case in TABLE_4]
+        return [printed.measure_peaks(make_track_spec(case, x), x["torso_pitch_rad"]) for case, x in plans]
+
+    def list_computed(self, what: str, key: str | None = None) -> list[Any]:
+        """Return a number of a computation on the plans of all cases, or on the tracked steps."""
+        results = [self.computed[f"{what}-{self.tracking or self.plan}-{case}"] for case in TABLE_4]
+        return results if key is None else [result[key] for result in results]
+
+    @cached_property
+    def tracked(self) -> list[RunRecord]:
+        """The colony's best tracked steps by case."""
+        return [choose_best(self.runs[make_title(self.tracking, case), "aco"]) for case in TABLE_4]
+
+    def list_tracked(self, name: str) -> list[float]:
+        """Return a tuned value or an index of the tracked steps of all cases."""
+        return [{**run.x, **run.verdict.indexes}[name] for run in self.tracked]
+
+
+def make_plan_spec(plan: str, case: int, label: str = "", **options: Any) -> ProblemSpec:
+    """Return the planner of a case, of least jerk or energy."""
+    options = {"minimise": plan, **options}
+    return ProblemSpec(name="stairs-plan", options=options, values=TABLE_4[case].stair, label=label or f"{plan}-{case}")
+
+
+def make_track_spec(case: int, plan: Mapping[str, float], tracking: str = "", **options: Any) -> ProblemSpec:
+    """Return the tracking of a plan, given by the planner's variables."""
+    chosen, parameters = parse_settings(TRACKINGS[tracking or LITERAL]["option"])
+    values = {**TABLE_4[case].stair, **{name: plan[name] for name in PLAN}, **parameters}
+    return ProblemSpec(
+        name="stairs-track", options={**chosen, **options}, values=values, label=make_title(tracking, case)
+    )
+
+
+def make_title(tracking: str, case: int) -> str:
+    """Return the label of a tracked step."""
+    return f"track-{tracking.replace(' ', '-').replace(',', '')}-{case}"
+
+
+def compute(runner: Runner, effort: StairsEffort) -> dict[str, StairsResults]:
+    """Plan all steps; then undo choices of the planner, simulate the plans, and track them."""
+    runs = runner.run_tasks(_make_plan_tasks(effort))
+    plans = {plan: StairsResults(plan=plan, runs=runs, computed={}) for plan in PLANS.values()}
+    tasks = [*_make_track_tasks(effort, plans), *(_make_choice_tasks(effort, plans) if effort.runs else ())]
+    runs |= runner.run_tasks(tasks)
+    computed = runner.compute([*_make_computations(effort, plans)], code=[printed])
+    results = {reading: StairsResults(plan=plan, runs=runs, computed=computed) for reading, plan in PLANS.items()}
+    if effort.runs:
+        for name, row in TRACKINGS.items():
+            results[name] = StairsResults(plan=row["plan"], runs=runs, computed=computed, tracking=name)
+        again = runner.compute([*_make_power_computations(effort, results)], code=[])
+        results = {name: replace(result, computed={**computed, **again}) for name, result in results.items()}
+    return results
+
+
+def _make_plan_tasks(effort: StairsEffort) -> Iterator[Task]:
+    for row in read_rows(FOLDER / "starts.csv"):
+        spec = make_plan_spec(row.pop("plan"), int(row.pop("case")))
+        start = {name: float(value) for name, value in row.items()}
+        yield Task(problem=spec, solver=IPOPT, settings=NEAR_OPTIMUM, start=start)
+        for task in make_start_tasks(spec, effort.starts - 1):
+            yield replace(task, run=task.run + 1)
+
+
+def _make_choice_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[Task]:
+    """Yield plans of case 2 under each choice, from ours, and plans with the printed hip height without our limits."""
+    for name, row in CHOICES.items():
+        for plan, result in plans.items():
+            spec = make_plan_spec(plan, DRAWN_CASE, label=f"{plan}-{name}", **row.options)
+            yield _start_near(replace(spec, values={**spec.values, **row.values}), result.best(DRAWN_CASE))
+    for case in TABLE_4:
+        spec = make_plan_spec("energy", case, label=f"hip-{case}", balance="polygon", angle_limits=False)
+        yield from make_start_tasks(replace(spec, values={**spec.values, **NO_LIMITS}), effort.starts)
+
+
+def _start_near(spec: ProblemSpec, best: RunRecord) -> Task:
+    problem = spec.load()
+    ends = zip(problem.names, problem.lower, problem.upper, strict=True)
+    start = {name: float(np.clip(best.x[name], lower, upper)) for name, lower, upper in ends}
+    return Task(problem=spec, solver=IPOPT, start=start)
+
+
+def _make_track_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[Task]:
+    for name, row in TRACKINGS.items():
+        for case in TABLE_4:
+            spec = make_track_spec(case, plans[row["plan"]].best(case).x, name)
+            yield from make_search_tasks(spec, {"aco": COLONY}, effort.runs, effort.evaluations)
+            if name == LITERAL and case in effort.track_cases:
+                label = spec.label if effort.runs else f"{spec.label}-short"
+                spec = replace(spec, options={**spec.options, "duration_s": effort.track_s}, label=label)
+                settings = {"time_limit_s": 600.0} if effort.runs else NEAR_OPTIMUM  # compiling pays for a whole step
+                yield Task(problem=spec, solver=IPOPT, settings=settings, start=TRACK_START)
+
+
+def _make_computations(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[Computation]:
+    for plan, result in plans.items():
+        for case in TABLE_4:
+            spec, x = make_plan_spec(plan, case), dict(result.best(case).x)
+            yield make_computation(f"climb-{plan}-{case}", spec, partial(printed.simulate_climb, spec), x=x)
+        first = result.best(1).x
+        track, rates = make_track_spec(1, first), [*NETWORK_RATES.values()]
+        settings = {"torso_pitch_rad": first["torso_pitch_rad"], "rates": rates, "poses": effort.poses}
+        yield make_computation(f"network-{plan}", track, partial(printed.train_network, track), **settings)
+
+
+def _make_power_computations(effort: StairsEffort, results: Mapping[str, StairsResults]) -> Iterator[Computation]:
+    for name in TRACKINGS:
+        for case, run in zip(TABLE_4, results[name].tracked, strict=True):
+            spec = make_track_spec(case, results[name].best(case).x, name)
+            settings = {"x": get_point(run), "evaluations": effort.evaluations}
+            yield make_computation(f"power-{name}-{case}", spec, partial(tune_otherwise, spec), **settings)
+
+
+def tune_otherwise(spec: ProblemSpec, x: Sequence[float], evaluations: int) -> dict[str, float]:
+    """Return the energies of the gains tuned without the power in (53), and of the gains x with an upright torso [J]."""
+    problem = spec.load()
+
+    def drop_power(assembly: Assembly, point: Point, _: Nonsmooth) -> Assembly:
+        margin = point["zmp_weight"] * assembly.indexes["zmp_margin_min_m"]
+        return replace(assembly, objective=assembly.indexes["tracking_cost"] - margin)
+
+    objective = compile_objective(problem.derive(name="stairs-errors", change=drop_power), threads=1)
+    tuned = minimize(objective, COLONY, evaluations=evaluations, seed=0).x
+    points = {"without_power_J": tuned.tolist(), "upright_J": [*x[:2], np.pi / 2]}
+    return {name: float(evaluate(problem, point).indexes["energy_J"]) for name, point in points.items()}

@@ -1,1 +1,0 @@
-"""A 12-joint walk at least energy and greatest balance margin."""
