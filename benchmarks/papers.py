@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 from compare.papers import REPRODUCTIONS, load_reproduction
+from compare.papers.paper_runs import Runner
 
 RECORDS = Path(__file__).parents[1] / "docs" / "papers"
 
@@ -21,7 +22,7 @@ def main() -> None:
     paper = load_reproduction(arguments.paper)
     effort = paper.quick if arguments.quick else paper.full
     command = f"python -m benchmarks.papers {arguments.paper}{' --quick' if arguments.quick else ''}"
-    paper.reproduce(arguments.out, effort, lambda line: print(line, flush=True), command=command)
+    paper.reproduce(Runner(folder=arguments.out, progress=lambda line: print(line, flush=True)), effort, command)
     shutil.copy(arguments.out / "summary.json", RECORDS / f"{arguments.paper}.json")
 
 

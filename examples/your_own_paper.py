@@ -16,7 +16,7 @@ from your_own_problem import walker
 
 from compare.analysis.record_statistics import approximate_rank_sum
 from compare.papers.paper import Paper, count_verdicts, read_book
-from compare.papers.paper_runs import Effort, choose_best, evaluate_point, make_search_tasks, make_start_tasks
+from compare.papers.paper_runs import Effort, Runner, choose_best, evaluate_point, make_search_tasks, make_start_tasks
 from compare.papers.rules import Found
 from compare.report.document import Figure
 from compare.study.task import IPOPT, ProblemSpec
@@ -80,6 +80,7 @@ REPRODUCTION = Paper(
 # The same as the command, without the searches.
 
 if __name__ == "__main__":
-    record = REPRODUCTION.reproduce(Path(tempfile.mkdtemp()), REPRODUCTION.quick, print, jobs=1)
+    runner = Runner(folder=Path(tempfile.mkdtemp()), progress=print, jobs=1)
+    record = REPRODUCTION.reproduce(runner, REPRODUCTION.quick)
     print(count_verdicts(record["verdicts"]))
     figure = plt.gcf()

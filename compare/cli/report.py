@@ -15,6 +15,7 @@ from compare.cli.options import Code, Scheduler, name_all, parse_numbers
 from compare.cli.printing import Output, describe_command, say, show_progress
 from compare.logs import write_ioh
 from compare.papers import REPRODUCTIONS, load_reproduction
+from compare.papers.paper_runs import Runner
 from compare.report import FurtherFiles, rebuild_report, watch_report, write_report
 from compare.study.evidence import read_evidence
 from compare.study.settings import read_manifest
@@ -107,9 +108,8 @@ def reproduce(
         chosen = read_dataclass(type(reproduction.full), effort, "effort", error=InputError)
     try:
         with show_progress(paper, None) as advance:
-            reproduction.reproduce(
-                out, chosen, advance, command=describe_command(), on_outdated=say, scheduler=scheduler
-            )
+            runner = Runner(folder=out, progress=advance, scheduler=scheduler, on_outdated=say)
+            reproduction.reproduce(runner, chosen, describe_command())
     except KeyboardInterrupt:
         return Output(data={}, interrupted=f"interrupted; {describe_stored(out)}")
     return Output(data={"paper": paper}, written=[out / "report.md"])

@@ -35,9 +35,7 @@ from compare.report.document import Document, Figure, Part, Prose, Section, Tabl
 from compare.report.provenance import TERMS, format_settings, make_reference_table, make_solver_table
 from compare.report.writing import make_citation_section, make_session_section, write_document
 from compare.study.settings import Session
-from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.files import make_writable_folder, write_json
-from nlp_gait.progress import Progress, ignore_progress
 
 E = TypeVar("E", bound=Effort)
 R = TypeVar("R")
@@ -55,16 +53,6 @@ class DifferenceRow:
     here: str
     option: str  # that selects the printed choice
     effect: str  # in words; empty where a function computes it
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """Options of the problem in ``option``."""
-        return parse_settings(self.option)[0]
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """Parameters of the problem in ``option``, each after ``--set``."""
-        return parse_settings(self.option)[1]
 
 
 def parse_settings(text: str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -173,35 +161,18 @@ class Paper(Generic[E, R]):
         """Name of the module."""
         return self.book.name
 
-    def reproduce(
-        self,
-        out: Path,
-        effort: E,
-        progress: Progress,
-        jobs: int | None = None,
-        command: str = "python",
-        on_outdated: Progress = ignore_progress,
-        scheduler: str | None = None,
-    ) -> dict[str, Any]:
-        """Write the report (HTML, Markdown), tables (CSV) and the figure, and return the record, ``summary.json``.
+    def reproduce(self, runner: Runner, effort: E, command: str = "python") -> dict[str, Any]:
+        """Write the report (HTML, Markdown), tables (CSV) and the figure to the runner's folder, and return ``summary.json``.
 
-        Args:
-            out: folder; results that an earlier call has stored in it are reused.
-            effort: how much is computed.
-            progress: receives a line for each run and each step.
-            jobs: worker processes; None for one on each core.
-            command: command line, for the report.
-            on_outdated: receives a line for each solver whose stored runs are recomputed, with the reason.
-            scheduler: address of a Dask scheduler, whose workers perform the runs; None for processes of this machine.
+        Results that an earlier call has stored in the folder are reused. The report names the command.
 
         Raises:
             OutputError: the folder cannot be written to.
         """
-        folder, jobs = make_writable_folder(out), jobs or available_cores()
-        session = Session.begin(command, scheduler or str(jobs))
-        runner = Runner(folder=folder, progress=progress, jobs=jobs, scheduler=scheduler, on_outdated=on_outdated)
+        folder = make_writable_folder(runner.folder)
+        session = Session.begin(command, runner.scheduler or str(runner.jobs))
         results = self.compute(runner, effort)
-        progress("figure, tables and report")
+        runner.progress("figure, tables and report")
         judged = self.judge(results, effort)
         label = "full" if effort == self.full else "quick" if effort == self.quick else "reduced"
         parts = self._make_parts(results, judged, effort, runner)

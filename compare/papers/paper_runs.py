@@ -19,6 +19,7 @@ from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from metaheuristics.interface import Algorithm
 from nlp_gait.backends.exact import ExactModel, build_exact_model
 from nlp_gait.backends.identity import fingerprint
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.progress import Progress, ignore_progress
@@ -39,8 +40,8 @@ class Runner:
     """Runs tasks and other computations of a reproduction; results that an earlier call has stored in its folder are read."""
 
     folder: Path  # of the reproduction
-    progress: Progress  # receives a line for each run and each computation
-    jobs: int  # worker processes; 1 runs in this process
+    progress: Progress = ignore_progress  # receives a line for each run and each computation
+    jobs: int = field(default_factory=available_cores)  # worker processes; 1 runs in this process
     scheduler: str | None = None  # address of a Dask scheduler for the runs; other computations stay on this machine
     on_outdated: Progress = ignore_progress  # receives a line for each solver whose stored runs are recomputed
     records: list[RunRecord] = field(default_factory=list)  # of all tasks, filled by ``run_tasks``

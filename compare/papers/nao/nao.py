@@ -28,7 +28,7 @@ from compare.papers.nao.results import (
     make_spec,
 )
 from compare.papers.nao.tables import JOINTS, compute_powers, list_errors, list_levels, list_margins, show
-from compare.papers.paper import Paper, read_book
+from compare.papers.paper import Paper, parse_settings, read_book
 from compare.papers.paper_runs import evaluate_point
 from compare.papers.rules import Found
 from nlp_gait.formulation.signals import Signals
@@ -241,9 +241,9 @@ def compare_readings(results: Mapping[str, NaoResults]) -> dict[str, float]:
 
 def measure_option(results: Mapping[str, NaoResults], id: str) -> dict[str, float]:
     """Return the changes of PSO's printed solutions with the option of a difference."""
-    row, effects = BOOK.differences[id], dict[str, float]()
+    options, effects = parse_settings(BOOK.differences[id].option)[0], dict[str, float]()
     for phase in ("dsp",) if id in ("lever", "arms-shared") else PHASES:  # of double support alone
-        after = evaluate_point(make_spec(phase, "printed", **row.options), PRINTED[phase, "PSO"].x)
+        after = evaluate_point(make_spec(phase, "printed", **options), PRINTED[phase, "PSO"].x)
         before = results["printed"].measure(phase)
         changes = {name: 100 * (after[name] / before[name] - 1) for name in KINDS.values()}
         effects[f"{PHASES[phase]}, power [%]"], effects["torque change [%]"] = changes.values()

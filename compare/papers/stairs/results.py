@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from compare.judge import evaluate
-from compare.papers.paper import DifferenceRow, parse_settings, read_rows
+from compare.papers.paper import parse_settings, read_rows
 from compare.papers.paper_runs import (
     Effort,
     Runner,
@@ -39,7 +39,7 @@ LITERAL = "as printed"
 DRAWN_CASE = 2
 # Choices of the planner that are undone one by one: their options are in differences.csv.
 CHOICES = {
-    row["id"]: DifferenceRow(**row)
+    row["id"]: parse_settings(row["option"])
     for row in read_rows(FOLDER / "differences.csv")
     if row["id"] in ("end-rate", "straight", "torso", "times", "shanks", "hull", "edges")
 }
@@ -165,10 +165,10 @@ def _make_plan_tasks(effort: StairsEffort) -> Iterator[Task]:
 
 def _make_choice_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[Task]:
     """Yield plans of case 2 under each choice, from ours, and plans with the printed hip height without our limits."""
-    for name, row in CHOICES.items():
+    for name, (options, values) in CHOICES.items():
         for plan, result in plans.items():
-            spec = make_plan_spec(plan, DRAWN_CASE, label=f"{plan}-{name}", **row.options)
-            yield _start_near(replace(spec, values={**spec.values, **row.values}), result.best(DRAWN_CASE))
+            spec = make_plan_spec(plan, DRAWN_CASE, label=f"{plan}-{name}", **options)
+            yield _start_near(replace(spec, values={**spec.values, **values}), result.best(DRAWN_CASE))
     for case in TABLE_4:
         spec = make_plan_spec("energy", case, label=f"hip-{case}", balance="polygon", angle_limits=False)
         yield from make_start_tasks(replace(spec, values={**spec.values, **NO_LIMITS}), effort.starts)

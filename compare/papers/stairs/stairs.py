@@ -31,7 +31,7 @@ from compare.papers.stairs.results import (
     make_title,
     make_track_spec,
 )
-from compare.report.document import Figure, Part, Prose, Table, Value
+from compare.report.document import Figure, Part, Table, Value
 from compare.study.task import IPOPT
 from nlp_gait.formulation.display import LEFT, RIGHT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
@@ -179,19 +179,8 @@ BOOK.bind({id: lambda results, id=id: measure_equations(TABLE_4[DRAWN_CASE])[id]
 
 
 def show(results: Mapping[str, StairsResults]) -> list[Part]:
-    """Return what decides the headline, Tables III and IV next to ours, the plans in the engine, the network, and the legs."""
-    climbs = "; ".join(map(describe_climb, results["least jerk"].list_computed("climb")))
-    words = f"**The plan of least jerk in MuJoCo**, cases 1 / 2 / 3: {climbs}."
-    if LITERAL in results:
-        found = results[LITERAL]
-        leads = " / ".join(f"{lead:+.1f} %" for lead in list_leads(found.list_tracked("peak_torque_Nm")))
-        errors = " / ".join(f"{error:.2f} rad" for error in found.list_tracked("largest_error_rad"))
-        words = (
-            "**In which reading case 2 is best.** Nearest the print the robot hangs on its planned hip, and gains are bounded. "
-            f"Peak torques of cases 1 and 3 are then {leads} from that of case 2; largest errors are {errors}. {words}"
-        )
+    """Return Tables III and IV next to ours, the plans in the engine, the network, and the legs."""
     return [
-        Prose(words),
         tabulate_plans(results),
         tabulate_fourth(results),
         tabulate_climbs(results),

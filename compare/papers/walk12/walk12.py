@@ -16,7 +16,7 @@ from casadi import SX
 from scipy.stats import qmc
 
 from compare.drawing.figures import COLOURS, make_axes
-from compare.papers.paper import Paper, read_book, read_rows
+from compare.papers.paper import Paper, parse_settings, read_book, read_rows
 from compare.papers.paper_runs import (
     Effort,
     Runner,
@@ -32,6 +32,7 @@ from compare.report.document import Figure, Part, Prose, Table, Value
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import GeneticAlgorithm
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.walk12 import walk12_model
 from nlp_gait.gaits.walk12.walk12_model import GRAVITY, load_point_mass_biped
@@ -40,18 +41,9 @@ from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
 from nlp_gait.symbolic.nonsmooth import Exact
 
 BOOK = read_book(__file__)
-READINGS = {
-    "as printed": "(9) and (14) as printed: Q over one step, the ankle on the ground, exact kinematics",
-    "(A1)": "the ZMP by the appendix, with (A1) as printed",
-    "ankle raised": f"the ankle {1e3 * walk12_model.ANKLE_HEIGHT_M:g} mm above the ground",
-    "one second": "Q over one second of walking for every step time",
-}
-OPTIONS: Mapping[str, dict[str, Any]] = {
-    "as printed": {},
-    "(A1)": {"zmp": "appendix-as-printed"},
-    "ankle raised": {"zmp": "raised-ankle"},
-    "one second": {"horizon": "1s"},
-}
+FOLDER = Path(__file__).parent
+READINGS = {row["name"]: row for row in read_rows(FOLDER / "readings.csv")}
+OPTIONS = {name: parse_settings(row["option"])[0] for name, row in READINGS.items()}
 LITERAL, RAISED, SECOND = "as printed", "ankle raised", "one second"
 GA, GA_EVALUATIONS = GeneticAlgorithm.goswami2008(), 930  # Table II: 30 epochs after the first population
 CONVERGED_EPOCH, EPOCHS_WEIGHT = 15, 0.15
@@ -89,7 +81,7 @@ class PaperRow:
 
 
 TABLE_3, TABLE_4 = (
-    [PaperRow(*map(float, row.values())) for row in read_rows(Path(__file__).with_name(f"{name}.csv"))]
+    [PaperRow(*map(float, row.values())) for row in read_rows(FOLDER / f"{name}.csv")]
     for name in ("table_3", "table_4")
 )
 SMALL, SECOND_ROW, LAST = TABLE_3[0], TABLE_3[1], TABLE_3[-1]  # lambda 0.1, 0.15 and 1
@@ -291,17 +283,10 @@ def list_zmp_errors(result: Results) -> list[float]:
 
 def compute_unreachable_share(result: Results) -> float:
     """Return the share of gaits within (7) with a leg that does not reach [%]."""
-    problem, robot = ProblemSpec(name="walk12").load(), load_point_mass_biped()
+    problem = ProblemSpec(name="walk12", values={"reach_margin_rad": 0.0}).load()  # its rows are those of reach
     points = qmc.scale(qmc.Sobol(len(NAMES), rng=0).random(SAMPLES), problem.lower, problem.upper)
-    (s, n, lift, bend), t = points.T[:, :, None], np.linspace(0.0, 1.0, 21)
-    hip_x = s / 4 * np.sin(np.pi * (t - 0.5))
-    hip_y = n * np.sin(np.pi / 2 * (np.sin(np.pi * t / 2) + 1)) * np.sin(np.pi * t)
-    lifted = lift * np.sin(np.pi * (np.sin(np.pi * (t - 0.5)) / 2 + 0.5))
-    hip_z = robot.leg_m - bend
-    # The swing hip is as far behind its ankle as the stance hip before its own, and mirrored.
-    legs = [np.sqrt(hip_x**2 + hip_y**2 + z**2) for z in (hip_z, hip_z - lifted)]
-    far, close = np.maximum(*legs).max(axis=1), np.minimum(*legs).min(axis=1)
-    return 100 * float(np.mean((far > robot.leg_m) | (close < abs(robot.thigh_m - robot.shank_m))))
+    violation = np.array(build_exact_model(problem).function(points.T, problem.p)[1])
+    return 100 * float(np.mean(violation > 0.0))
 
 
 def list_rod_changes(result: Results) -> list[float]:
@@ -364,10 +349,10 @@ def compute_gain(result: Results) -> float:
 
 def measure_option(results: Mapping[str, Results], id: str) -> dict[str, float]:
     """Return the least and the largest change of f1 of Table III by an option, and more where it is a reading."""
-    row = BOOK.differences[id]
-    changes = [100 * (compute_f1(gait, **row.options) / compute_f1(gait) - 1) for gait in TABLE_3]
+    options = parse_settings(BOOK.differences[id].option)[0]
+    changes = [100 * (compute_f1(gait, **options) / compute_f1(gait) - 1) for gait in TABLE_3]
     effects = {"f1 of Table III, least change [%]": min(changes), "largest [%]": max(changes)}
-    if reading := next((name for name, options in OPTIONS.items() if options == row.options), None):
+    if reading := next((name for name, chosen in OPTIONS.items() if chosen == options), None):
         result = results[reading]
         effects |= {"f of Table III within 1 %": count_met(result), "largest f1 [1/(m² s)]": compute_f1max(result)}
     return effects
@@ -524,10 +509,10 @@ def explain(results: Mapping[str, Results]) -> str:
 
 REPRODUCTION = Paper(
     book=BOOK,
-    title="The 12-joint walk: Goswami, Vadakkepat, Phung (2008), reproduced",
+    title="The 12-joint walk: Goswami, Vadakkepat, Phung (2008)",
     full=Walk12Effort(),
     quick=Walk12Effort(runs=0, starts=5, lengths_m=(0.05, 0.09, 0.13)),
-    readings=READINGS,
+    readings={name: row["text"] for name, row in READINGS.items()},
     compute=compute,
     headlines=(
         *("f", "f1-last", "f1max", "optimal", "ranks-3", "short-steps", "margin"),

@@ -170,7 +170,7 @@ class Ipopt(Solver):
         warm |= {f"ipopt.warm_start_{what}_push": 1e-6 for what in ("bound", "slack_bound", "mult_bound")}
         warm["ipopt.warm_start_init_point"] = "yes"
         self.warm = ca.nlpsol("warm", "ipopt", nlp, {**options, **derivatives, **warm})
-        # Narrower sigmoids start close to a feasible point: a larger barrier throws samples over the jump, to a worse local optimum.
+        # Narrower sigmoids start close to a feasible point: a larger barrier throws samples over the jump, to a worse optimum.
         near: dict[str, Any] = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": WARM_BARRIER}
         near |= {f"ipopt.{what}": 1e-6 for what in ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")}
         self.near = ca.nlpsol("near", "ipopt", nlp, {**options, **derivatives, **near}) if model.smoothed else self.warm

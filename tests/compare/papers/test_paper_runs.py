@@ -12,7 +12,6 @@ from compare.papers.paper_runs import Runner, choose_best, make_start_tasks
 from compare.study.run_task import run_task
 from compare.study.task import ProblemSpec, Task, check_task
 from nlp_gait.errors import InputError
-from nlp_gait.progress import ignore_progress
 from tests.compare.records import POWER, record
 
 WALK = ProblemSpec(name="walk12")
@@ -45,7 +44,7 @@ def test_a_run_without_a_point_ends_the_reproduction_and_says_why(tmp_path: Path
     with pytest.raises(
         InputError, match="walk12/no_luck-0000-[0-9a-f]{8} failed: ValueError: no luck; fix this and delete"
     ):
-        Runner(folder=tmp_path, progress=ignore_progress, jobs=1).run_tasks([Task(problem=WALK, solver=no_luck)])
+        Runner(folder=tmp_path, jobs=1).run_tasks([Task(problem=WALK, solver=no_luck)])
 
 
 def test_a_start_point_is_for_nlp_solvers() -> None:

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from compare.papers import REPRODUCTIONS, load_reproduction
+from compare.papers.paper_runs import Runner
 from compare.papers.rules import Ruling
 from docs.pages.papers import RECORDS, paper_page
 from nlp_gait.errors import OutputError
-from nlp_gait.progress import ignore_progress
 
 
 @pytest.mark.slow
@@ -19,7 +19,7 @@ from nlp_gait.progress import ignore_progress
 def test_a_quick_run_confirms_the_record(name: str, tmp_path: Path) -> None:
     paper = load_reproduction(name)
     recorded = json.loads((RECORDS / f"{name}.json").read_text(encoding="utf-8"))["verdicts"]
-    quick = paper.reproduce(tmp_path, paper.quick, ignore_progress, jobs=1)["verdicts"]
+    quick = paper.reproduce(Runner(folder=tmp_path, jobs=1), paper.quick)["verdicts"]
     assert quick.keys() == recorded.keys() == paper.book.claims.keys()
     for id, row in quick.items():
         words = {*row.values()} if id in paper.book.on_runs else row
@@ -50,4 +50,4 @@ def test_a_folder_that_cannot_be_written_to_fails_before_the_work(name: str, tmp
     (tmp_path / "file").write_text("")
     paper = load_reproduction(name)
     with pytest.raises(OutputError):
-        paper.reproduce(tmp_path / "file", paper.quick, print)
+        paper.reproduce(Runner(folder=tmp_path / "file"), paper.quick)

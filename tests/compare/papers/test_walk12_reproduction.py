@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from compare.papers.paper_runs import Runner
 from compare.papers.walk12.walk12 import (
     LITERAL,
     RAISED,
@@ -22,7 +23,6 @@ from compare.papers.walk12.walk12 import (
     list_rod_changes,
 )
 from compare.study.record import read_record
-from nlp_gait.progress import ignore_progress
 from tests.compare.records import record
 
 
@@ -30,7 +30,7 @@ from tests.compare.records import record
 def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     """Folder and record of the quick reproduction, in this process."""
     folder = tmp_path_factory.mktemp("walk12")
-    return folder, REPRODUCTION.reproduce(folder, REPRODUCTION.quick, ignore_progress, jobs=1)
+    return folder, REPRODUCTION.reproduce(Runner(folder=folder, jobs=1), REPRODUCTION.quick)
 
 
 def test_f1_that_table_4_implies() -> None:
