@@ -17,6 +17,7 @@ ORDER = (
     "your_own_limit.py",
     "your_own_problem.py",
     "your_own_algorithm.py",
+    "your_own_paper.py",
     "results_from_matlab.py",
     "custom_robot.py",
     "physics_engine.py",
