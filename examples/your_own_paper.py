@@ -19,7 +19,7 @@ from compare.papers.paper import Paper, count_verdicts, read_book
 from compare.papers.paper_runs import Effort, Runner, choose_best, evaluate_point, make_search_tasks, make_start_tasks
 from compare.papers.rules import Found
 from compare.report.document import Figure
-from compare.study.task import IPOPT, ProblemSpec
+from compare.study.task import ProblemSpec
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
 
 BOOK = read_book(__file__)
@@ -50,7 +50,7 @@ def compute(runner, effort):
 
 
 def list_powers(found):
-    return [choose_best(found.runs[f"walker-{speed:g}", IPOPT]).verdict.objective for speed in SPEEDS_M_S]
+    return [choose_best(found.runs[f"walker-{speed:g}", "ipopt"]).verdict.objective for speed in SPEEDS_M_S]
 
 
 def compare_searches(found):

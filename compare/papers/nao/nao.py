@@ -71,12 +71,12 @@ def keep(result: NaoResults, phase: str) -> dict[str, float]:
     return {}
 
 
-def straighten(result: NaoResults, phase: str) -> dict[str, float]:
+def remove_oscillation(result: NaoResults, phase: str) -> dict[str, float]:
     """Return the change to a hip without vertical motion."""
     return {"hip_vz_start_m_s": 0.0, "hip_vz_end_m_s": 0.0}
 
 
-def lower_hip(result: NaoResults, phase: str) -> dict[str, float]:
+def choose_lowest_hip(result: NaoResults, phase: str) -> dict[str, float]:
     """Return the change to the lowest hip of the sweep at which there is a gait."""
     return {"hip_height_m": result.sweep("hip", phase)[0][0]}
 
@@ -89,7 +89,7 @@ def compute_root_mean(signals: Signals, kind: str = "") -> float:
 
 def list_oscillation_torques(result: NaoResults) -> list[list[float]]:
     """Return the rms torque without vertical motion of the hip, and as printed, in both phases [Nm]."""
-    changes = [[change(result, phase) for change in (straighten, keep)] for phase in PHASES]
+    changes = [[change(result, phase) for change in (remove_oscillation, keep)] for phase in PHASES]
     pairs = zip(PHASES, changes, strict=True)
     return [[compute_root_mean(result.sample(phase, **change)) for change in pair] for phase, pair in pairs]
 
@@ -97,7 +97,9 @@ def list_oscillation_torques(result: NaoResults) -> list[list[float]]:
 def list_relief(result: NaoResults) -> list[list[float]]:
     """Return the rms torque of knees and ankles with the lowest and the highest hip, in both phases [Nm]."""
     highest = {"hip_height_m": HIPS_M[-1]}
-    ends = [[result.sample(phase, **change) for change in (lower_hip(result, phase), highest)] for phase in PHASES]
+    ends = [
+        [result.sample(phase, **change) for change in (choose_lowest_hip(result, phase), highest)] for phase in PHASES
+    ]
     return [[compute_root_mean(end, kind) for end in pair] for pair in ends for kind in ("Knee", "Ankle")]
 
 
@@ -206,10 +208,10 @@ BOOK.bind(
         "margin-leads-dsp": lambda r: list_leads(r, "dsp", MARGINS),
         "more-stable": lambda r: [1000 * (r.measure("dsp")[index] - r.measure("ssp")[index]) for index in MARGINS],
         "swing-beyond": lambda r: list_powers(r, "swing", "ssp"),
-        "lower-hip-x": lambda r: list_pairs(r, keep, lower_hip, MARGINS[:1]),
-        "lower-hip-y": lambda r: list_pairs(r, keep, lower_hip, MARGINS[1:2]),
-        "straight": lambda r: list_pairs(r, keep, straighten, MARGINS[:2]),
-        "oscillation": lambda r: list_pairs(r, straighten, keep, ["power_W"]),
+        "lower-hip-x": lambda r: list_pairs(r, keep, choose_lowest_hip, MARGINS[:1]),
+        "lower-hip-y": lambda r: list_pairs(r, keep, choose_lowest_hip, MARGINS[1:2]),
+        "straight": lambda r: list_pairs(r, keep, remove_oscillation, MARGINS[:2]),
+        "oscillation": lambda r: list_pairs(r, remove_oscillation, keep, ["power_W"]),
         "oscillation-torque": list_oscillation_torques,
         "relief": list_relief,
         "few-mm": lambda r: list_hip_ranges(r, SEARCHES),
