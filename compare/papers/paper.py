@@ -274,7 +274,10 @@ class Paper(Generic[E, R]):
             run = effort.runs or row.id not in self.book.on_runs
             effect = row.effect or (self.book.functions[row.id](results) if run else str(Ruling.NOT_RUN))
             if not isinstance(effect, str):
-                words = {name: value if isinstance(value, str) else f"{value:.4g}" for name, value in effect.items()}
+                words = {
+                    name: value if isinstance(value, str) else f"{round(value, 6):.4g}"
+                    for name, value in effect.items()
+                }
                 effect = "; ".join(f"{name}: {value}" for name, value in words.items())
             rows.append((row.where, row.printed, row.here, row.option, effect))
         headings = ("where", "printed", "here", "option", "effect")

@@ -118,9 +118,9 @@ def evaluate_point(spec: ProblemSpec, x: Sequence[float]) -> Mapping[str, float]
 
 
 def tabulate(name: str, caption: str, rows: Sequence[Mapping[str, Value]]) -> Table:
-    """Return a table of rows by heading, numbers to four digits."""
+    """Return a table of rows by heading, numbers to five digits."""
     return Table(
-        name=name, columns=dict.fromkeys(rows[0], ".4g"), rows=[[*row.values()] for row in rows], caption=caption
+        name=name, columns=dict.fromkeys(rows[0], ".5g"), rows=[[*row.values()] for row in rows], caption=caption
     )
 
 

@@ -79,6 +79,11 @@ class ClaimRow:
         """The printed values."""
         return np.array([float(value) for value in self.printed.split(" / ")])
 
+    @property
+    def signed(self) -> bool:
+        """Whether the printed values are changes."""
+        return all(value[0] in "+-" for value in self.printed.split(" / "))
+
 
 def decide(claim: ClaimRow, found: Found | None) -> Ruling:
     """Return the verdict on a claim; None if there is no feasible result."""
@@ -115,8 +120,7 @@ def _compare(claim: ClaimRow, ours: np.ndarray[Any, Any], size: float, *, relati
     close = np.abs(ours - printed) <= size * (np.abs(printed) / 100 if relative else 1.0) * (1 + ROUNDING)
     if close.all():
         return Ruling.HOLDS
-    signed = all(value[0] in "+-" for value in claim.printed.split(" / "))
-    return Ruling.SIZE_DIFFERS if signed and (np.sign(ours) == np.sign(printed)).all() else Ruling.FAILS
+    return Ruling.SIZE_DIFFERS if claim.signed and (np.sign(ours) == np.sign(printed)).all() else Ruling.FAILS
 
 
 def _judge_ranks(printed: np.ndarray[Any, Any], runs: np.ndarray[Any, Any]) -> Ruling:
@@ -140,7 +144,7 @@ def describe(claim: ClaimRow, found: Found | None) -> str:
         ranks = " / ".join(str((row < printed).sum()) for row, printed in zip(rows, claim.values, strict=True))
         ends = "; ".join(f"{row.min():.4g} to {row.max():.4g}" for row in rows)
         return f"{ends}{_space(claim.unit)}; {ranks} of {rows.shape[1]} runs below"
-    signed = claim.printed[:1] in ("+", "-") and claim.parts[0] == "within"
+    signed = claim.parts[0] == "within" and claim.signed
     text = "; ".join(_join(row, signed) for row in np.atleast_2d(values)) + _space(claim.unit)
     if found.p is None:
         return text
@@ -150,7 +154,8 @@ def describe(claim: ClaimRow, found: Found | None) -> str:
 
 
 def _join(row: Sequence[float], signed: bool) -> str:
-    shown = [format(value, "+z.4g" if signed else "z.4g") for value in row]
+    sign = "+" if signed else ""
+    shown = [format(value, f"{sign}z.{6 if float(value).is_integer() else 4}g") for value in row]
     return f"{shown[0]} to {shown[-1]}" if len(shown) > 8 else " / ".join(shown)
 
 

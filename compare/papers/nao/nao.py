@@ -58,9 +58,12 @@ def list_powers(result: NaoResults, what: str, phase: str) -> list[float] | None
 
 
 def list_pairs(result: NaoResults, before: Change, after: Change, indexes: Sequence[str]) -> list[list[float]]:
-    """Return figures of PSO's printed solutions under two changes, which depend on the phase, in both phases."""
+    """Return power [W] or margins [mm] of PSO's printed solution under two changes, in both phases."""
     return [
-        [result.measure(phase, **change(result, phase))[index] for change in (before, after)]
+        [
+            (1.0 if index == "power_W" else 1000.0) * result.measure(phase, **change(result, phase))[index]
+            for change in (before, after)
+        ]
         for phase in PHASES
         for index in indexes
     ]
@@ -231,14 +234,24 @@ BOOK.bind(
 )
 
 
-def compare_readings(results: Mapping[str, NaoResults]) -> dict[str, float]:
-    """Return the largest error of the margins in both readings [mm]."""
-    kinds = {"margins of single support": ("ssp", MARGINS), "least margins of double support": ("dsp", MARGINS[:2])}
-    return {
-        f"largest error of {words}, {reading} reading [mm]": float(np.abs(list_errors(results[reading], *kind)).max())
-        for words, kind in kinds.items()
-        for reading in READINGS
-    }
+def measure_choice(results: Mapping[str, NaoResults], id: str) -> dict[str, float]:
+    """Return the largest error of the printed margins with one choice of the printed reading alone [mm]."""
+    options, effects = parse_settings(BOOK.differences[id].option)[0], dict[str, float]()
+    kinds = {"ssp": ("margins of single support", MARGINS), "dsp": ("least margins of double support", MARGINS[:2])}
+    for phase in ("dsp",) if id == "masses" else PHASES:
+        words, indexes = kinds[phase]
+        errors = []
+        for search in SEARCHES:
+            figures, printed = (
+                evaluate_point(make_spec(phase, "physical", **options), PRINTED[phase, search].x),
+                PRINTED[phase, search],
+            )
+            errors += [1000 * abs(figures[index] - printed.figures[index]) for index in indexes]
+        effects[f"largest error of {words}, with this alone [mm]"] = max(errors)
+        effects["without [mm]"], effects["with all [mm]"] = (
+            max(map(abs, list_errors(results[reading], phase, indexes))) for reading in ("physical", "printed")
+        )
+    return effects
 
 
 def measure_option(results: Mapping[str, NaoResults], id: str) -> dict[str, float]:
@@ -247,13 +260,14 @@ def measure_option(results: Mapping[str, NaoResults], id: str) -> dict[str, floa
     for phase in ("dsp",) if id in ("lever", "arms-shared") else PHASES:  # of double support alone
         after = evaluate_point(make_spec(phase, "printed", **options), PRINTED[phase, "PSO"].x)
         before = results["printed"].measure(phase)
-        changes = {name: 100 * (after[name] / before[name] - 1) for name in KINDS.values()}
-        effects[f"{PHASES[phase]}, power [%]"], effects["torque change [%]"] = changes.values()
-        effects["margins by up to [mm]"] = max(1000 * abs(after[index] - before[index]) for index in MARGINS)
+        for name, index in zip(("power", "torque change"), KINDS.values(), strict=True):
+            effects[f"{name} of {PHASES[phase]} [%]"] = 100 * (after[index] / before[index] - 1)
+        largest = max(1000 * abs(after[index] - before[index]) for index in MARGINS)
+        effects[f"margins of {PHASES[phase]} by up to [mm]"] = largest
     return effects
 
 
-BOOK.bind(dict.fromkeys(("zmp", "samples", "masses"), compare_readings))
+BOOK.bind({id: partial(measure_choice, id=id) for id in ("zmp", "samples", "masses")})
 OPTIONAL = ("lever", "arms-shared", "finite", "robot", "separate", "held")
 BOOK.bind({id: partial(measure_option, id=id) for id in OPTIONAL})
 
