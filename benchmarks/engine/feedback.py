@@ -35,7 +35,7 @@ CONDITIONS: Mapping[str, Conditions] = {
 }
 DEFAULT = Feedback()
 NOISES = ("position_noise_m", "velocity_noise_m_s", "tilt_noise_rad", "rate_noise_rad_s")
-STRENGTHS = ("spring_N_per_m", "damper_Ns_per_m", "tilt_spring_Nm_per_rad", "tilt_damper_Nms_per_rad")
+STRENGTHS = ("spring", "damper", "tilt_spring", "tilt_damper")
 
 
 def scale_strength(feedback: Feedback, factor: float) -> Feedback:

@@ -19,9 +19,9 @@ class Feedback:
     """A spring and a damper between the torso and its planned place over the feet, and between both attitudes.
 
     Force and moment act on the ground through the legs that are planned to stand, each with its planned share of the load, and
-    are added to the set-points as torque / stiffness. Horizontally it controls the divergent component of motion x + v / w of a
-    pendulum of height h with w^2 = g / h: gain k corresponds to a spring of m w^2 k and a damper of m w k, which are 480 N/m and
-    78 N s/m for NAO's 5.3 kg, h = 0.26 m and k = 2.4.
+    are added to the set-points as torque / stiffness. Gains are in units of a pendulum with the robot's mass m, the height h of
+    its torso at the start and w^2 = g / h, so that all robots share them: for NAO the springs are 504 N/m and 31 Nm/rad.
+    Horizontally they control the divergent component of motion x + v / w: gain k corresponds to a spring and a damper of k.
 
     Source:
         Virtual model control: Pratt, Chew, Torres, Dilworth, Pratt (2001). Gain k: Caron, Kheddar, Tempier (2019), whose
@@ -38,10 +38,10 @@ class Feedback:
     tilt_noise_rad: float = 1e-3  # of its attitude about each axis
     rate_noise_rad_s: float = 0.01  # of its rates
     seed: int = 0
-    spring_N_per_m: float = 500.0  # towards the planned place
-    damper_Ns_per_m: float = 50.0  # towards the planned velocity
-    tilt_spring_Nm_per_rad: float = 30.0  # towards the planned attitude
-    tilt_damper_Nms_per_rad: float = 2.0  # against turning
+    spring: float = 3.0  # towards the planned place [m w^2]
+    damper: float = 1.7  # towards the planned velocity [m w]
+    tilt_spring: float = 1.9  # towards the planned attitude [m g h]
+    tilt_damper: float = 0.7  # against turning [m g h / w]
     growth_per_s: float = 2.0  # integral gain: share of force and moment by which they grow per second
     # of the integral, along each axis: of the force as a share of the weight, of the moment as that share of the weight
     # at the height of the torso; 0.05 compensates a slope of 3 degrees
@@ -113,7 +113,11 @@ class BalanceController:
         self._sensor = TorsoSensor(feedback, plan, model)
         self._shift = np.zeros(len(plan.joints))
         self._integral = np.zeros(6)  # force [N] and moment [Nm]
-        weight, height = plan.robot.mass_kg * plan.gravity, plan.at("hip", np.zeros(1))[0, 2]
+        mass, height = plan.robot.mass_kg, float(plan.at("hip", np.zeros(1))[0, 2])
+        weight, rate = mass * plan.gravity, math.sqrt(plan.gravity / height)
+        self._spring, self._damper = feedback.spring * mass * rate**2, feedback.damper * mass * rate
+        self._tilt_spring = feedback.tilt_spring * weight * height
+        self._tilt_damper = feedback.tilt_damper * weight * height / rate
         self._most = feedback.growth_limit * weight * np.repeat([1.0, height], 3)
 
     def fork(self) -> Self:
@@ -141,11 +145,11 @@ class BalanceController:
         planned, soles = self._planned_posture(time, int(share[1] > share[0]))
         feet = np.stack([plan.at(f"{side}_foot", time)[0] for side in SIDES])
         place = plan.at("hip", time)[0] - share @ feet
-        force = settings.spring_N_per_m * (place - share @ measured.places)
-        force += settings.damper_Ns_per_m * (plan.rate("hip", time)[0] - measured.velocity)
+        force = self._spring * (place - share @ measured.places)
+        force += self._damper * (plan.rate("hip", time)[0] - measured.velocity)
         tilt = to_rotation_vector(planned @ measured.attitude.T) - measured.tilt_error
-        moment = settings.tilt_spring_Nm_per_rad * tilt
-        moment -= settings.tilt_damper_Nms_per_rad * measured.rate
+        moment = self._tilt_spring * tilt
+        moment -= self._tilt_damper * measured.rate
         wrench = np.concatenate([force, moment])
         integral = self._integral + settings.growth_per_s * settings.period_s * wrench
         self._integral = np.clip(integral, -self._most, self._most)

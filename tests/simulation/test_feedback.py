@@ -61,10 +61,10 @@ def simulate(plan: Plan, feedback: Feedback | None, conditions: Conditions | Non
 @pytest.mark.slow
 def test_without_springs_it_is_open_loop_to_the_last_bit(step: Plan) -> None:
     none = {
-        "spring_N_per_m": 0.0,
-        "damper_Ns_per_m": 0.0,
-        "tilt_spring_Nm_per_rad": 0.0,
-        "tilt_damper_Nms_per_rad": 0.0,
+        "spring": 0.0,
+        "damper": 0.0,
+        "tilt_spring": 0.0,
+        "tilt_damper": 0.0,
     }
     weightless, alone = simulate(step, replace(Feedback(), **none)), simulate(step, None)
     for name in ("q", "torque", "set_points", "feet"):
@@ -111,7 +111,7 @@ def test_torques_do_the_virtual_work_of_the_springs(plan: Plan) -> None:
     """At lift-off, when both feet carry: slopes of force times the torso's place over each foot, by our own kinematics."""
     drive, names, start = Drive(), list(plan.joints), np.zeros(1)
     stiffness = np.array([drive.stiffness(plan.robot.joint(name)) for name in names])
-    spring = replace(IDEAL, damper_Ns_per_m=0.0, tilt_damper_Nms_per_rad=0.0, growth_per_s=0.0)
+    spring = replace(IDEAL, damper=0.0, tilt_damper=0.0, growth_per_s=0.0)
     model, data = prepare(plan, Conditions(), drive, "rectangle")
     for name, bent in (("LAnklePitch", 0.1), ("LKneePitch", 0.05), ("RHipRoll", 0.1)):  # the torso's place changes
         data.qpos[model.joint(name).qposadr[0]] += bent
@@ -120,7 +120,14 @@ def test_torques_do_the_virtual_work_of_the_springs(plan: Plan) -> None:
     assert shares.min() > 0.1
     feet = [data.site(side).xpos for side in SIDES]
     planned = plan.at("hip", start)[0] - shares @ np.stack([plan.at(f"{side}_foot", start)[0] for side in SIDES])
-    force = 500.0 * (planned - (data.body("torso").xpos - shares @ np.stack(feet)))
+    height = plan.at("hip", start)[0, 2]
+    force = (
+        IDEAL.spring
+        * plan.robot.mass_kg
+        * plan.gravity
+        / height
+        * (planned - (data.body("torso").xpos - shares @ np.stack(feet)))
+    )
     assert np.linalg.norm(force) > 1.0
     expected = np.zeros(len(names))
     for share, side in zip(shares, SIDES, strict=True):
@@ -154,7 +161,7 @@ def test_weaker_servos_are_weaker(plan: Plan) -> None:
     np.testing.assert_array_equal(weak.actuator_biasprm[:, 2], as_assumed.actuator_biasprm[:, 2])
 
 
-@pytest.mark.parametrize(("name", "value"), [("period_s", 0.0), ("delay_s", -0.01), ("spring_N_per_m", float("nan"))])
+@pytest.mark.parametrize(("name", "value"), [("period_s", 0.0), ("delay_s", -0.01), ("spring", float("nan"))])
 def test_settings_that_no_controller_has_are_refused(name: str, value: float) -> None:
     with pytest.raises(InputError, match=f"{name} of a feedback must be"):
         Feedback(**{name: value})
