@@ -16,7 +16,7 @@ from nlp_gait.robots.inference import EXTENTS, SIDES, Feet, Side, find_legs, inf
 from nlp_gait.robots.packages import MARK, MODEL_ENDINGS, find_robot_file
 from nlp_gait.robots.perturbation import perturb, split_name
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, check_robot_name, make_unit_axis
-from nlp_gait.robots.tree import check_inertias, reverse_joint, shift_to_com
+from nlp_gait.robots.tree import check_inertias, move_root, reverse_joint, shift_to_com
 from nlp_gait.robots.welding import Joints, Links, RobotParts, find_faults, weld_faults
 
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
@@ -275,6 +275,10 @@ def _complete(
             foot["link"] = model.carriers.get(str(foot.get("link")), foot.get("link"))
     legs = find_legs(name, links, joints, feet)
     weld_faults(links, joints, legs.links, notes)
+    ankle_m, hip_m = (float(legs.chains[0][k].place[2]) for k in (0, -1))
+    if hip_m > (hip_m - ankle_m) / 2:  # as of a root on the ground; gaits and falls refer to an origin near the hips
+        notes.append(f"the root's origin is {hip_m:.2f} m below the hips: it was moved up to them")
+        move_root(str(description.file.root), links, joints, hip_m)
     if not all(set(EXTENTS) <= set(feet.get(side, ())) for side in SIDES):
         forward = description.file.forward
         feet = infer_feet(name, legs, links, joints, feet, model.read_shapes, forward, notes)

@@ -189,6 +189,18 @@ def turn_parts(links: dict[str, Link], joints: dict[str, Joint], rotation: Array
         joints[name] = replace(joint, origin_m=origin, axis=axis)
 
 
+def move_root(root: str, links: dict[str, Link], joints: dict[str, Joint], height_m: float) -> None:
+    """Move the origin of the root up; its body and its joints stay where they are."""
+    links[root] = replace(links[root], com_m=_lower(links[root].com_m, height_m))
+    for name, joint in joints.items():
+        if joint.parent == root:
+            joints[name] = replace(joint, origin_m=_lower(joint.origin_m, height_m))
+
+
+def _lower(place: tuple[float, float, float], height_m: float) -> tuple[float, float, float]:
+    return place[0], place[1], place[2] - height_m
+
+
 def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:
     """Return the robot with joints turned by angles [rad], which then count as zero; all links get the root's axes there."""
     turns = {robot.root: np.eye(3)}

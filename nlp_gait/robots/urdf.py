@@ -42,6 +42,7 @@ ATTRIBUTES = {
 TURNING = ("revolute", "continuous")
 KINDS = (*TURNING, "prismatic", "floating", "planar", "fixed", "unknown")
 SHAPES = ("collision", "visual")
+WORLD = "world"
 MOST_PARTS = 2000  # links and joints; the time to read them grows with the square
 
 
@@ -54,6 +55,7 @@ def read_urdf(path: str, *, about_joint: bool = False) -> RobotParts:
     read, or ValueError if it is not a URDF, its links do not form a tree, or a value is missing or not allowed.
     """
     robot = _read_xml(path)
+    _rename_world(robot)
     name = _read_text(robot, "name")
     links = {_read_text(link, "name"): link for link in robot.findall("link")}
     joints = [_read_joint(element) for element in robot.findall("joint")]
@@ -66,6 +68,14 @@ def read_urdf(path: str, *, about_joint: bool = False) -> RobotParts:
     turning = [_read_turning(joint, poses[joint.child]) for joint in joints if joint.kind in TURNING]
     read_shapes = partial(_read_foot_shapes, Path(path), links, poses, list_carriers(frames))
     return join_frames(name, frames, turning, read_shapes)
+
+
+def _rename_world(robot: Any) -> None:
+    """Rename a link that has the name of the ground in MuJoCo, as the root of a robot often has in ROS."""
+    for key, tags in (("name", ("link",)), ("link", ("parent", "child"))):
+        for element in robot.iter(*tags):
+            if element.get(key) == WORLD:
+                element.set(key, f"{WORLD}_link")
 
 
 class UrdfJoint(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as Xml
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ from nlp_gait.simulation.joint_controller import GravityCompensation, JointContr
 from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.shapes import Capsule, Prism, make_shapes
-from nlp_gait.simulation.simulate import Conditions, prepare
+from nlp_gait.simulation.simulate import Conditions, Run, prepare
+from tests.robots.crooked import crooked, crooked_urdf
 
 pytest.importorskip("mujoco")
 
@@ -139,3 +141,20 @@ def test_gravity_is_compensated_by_the_torques_that_hold_the_posture_over_the_fo
     np.testing.assert_allclose(compensation.hold(data)[joints], expected[joints], atol=1e-6)
     shift = compensation.correct(np.zeros(len(plan.joints)), data)
     np.testing.assert_allclose(shift[joints], 0.5 * expected[joints] / 100.0, atol=1e-8)
+
+
+def test_a_root_on_the_ground_that_is_named_world_is_the_same_robot(tmp_path: Path) -> None:
+    """As in ROS: the file's root is the ground, fixed to the base."""
+    base = (
+        '<link name="world"/><joint name="to_base" type="fixed"><origin xyz="0 0 0.9"/><parent link="world"/>'
+        '<child link="base"/></joint></robot>'
+    )
+    traces = []
+    for text in (crooked_urdf(), crooked_urdf().replace("</robot>", base)):
+        problem = nlp_gait.load("humanoid-ssp", robot=crooked(tmp_path, text))
+        plan = make_plan(result_of(problem, problem.start_point(np.random.default_rng(0))))
+        run = Run(plan)
+        assert run.advance(0.05) and run.fell_at_s is None
+        traces.append(run.data.qpos.copy())
+    assert plan.robot.root == "world_link"
+    np.testing.assert_allclose(traces[1][7:], traces[0][7:], atol=1e-6)  # angles; origins of the roots differ
