@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from compare.drawing.figures import use_style
-from compare.papers.paper_runs import Effort, Runner, tabulate_runs
+from compare.papers.paper_runs import Effort, Runner, tabulate, tabulate_runs
 from compare.papers.rules import ClaimRow, Found, Ruling, decide, describe
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, make_text_table
 from compare.report.provenance import TERMS, format_settings, make_reference_table, make_solver_table
@@ -240,10 +240,14 @@ class Paper(Generic[E, R]):
             first = next(iter(row.values()))
             held = [reading for reading, one in row.items() if one.verdict is Ruling.HOLDS]
             holds_in = "every reading" if len(held) == len(row) else "; ".join(held) or "no reading"
-            run = first.verdict is not Ruling.NOT_RUN
-            rows.append((claim.claim, _add_unit(claim), first.here, str(first.verdict), holds_in if run else ""))
-        headings = ("claim", "printed", "here", "verdict", "holds in")
-        return Table(name="headlines", columns=dict.fromkeys(headings, ""), rows=rows, prose=True)
+            shown = {
+                "claim": claim.claim,
+                "printed": _add_unit(claim),
+                "here": first.here,
+                "verdict": str(first.verdict),
+            }
+            rows.append({**shown, "holds in": "" if first.verdict is Ruling.NOT_RUN else holds_in})
+        return tabulate("headlines", "", rows, prose=True)
 
     def _fold(
         self, name: str, title: str, ids: Sequence[str], judged: Mapping[str, Mapping[str, Judgement]]
@@ -251,22 +255,16 @@ class Paper(Generic[E, R]):
         """Return a folded table of claims, those first whose verdict depends on the reading; nothing without claims."""
         if not ids:
             return []
-        rows, readings = [], self._list_readings(ids[0])
+        rows = []
         for id in sorted(ids, key=lambda id: len({one.verdict for one in judged[id].values()}) == 1):
             claim = self.book.claims[id]
-            cells = [f"{one.verdict}: {one.here}" if one.here else str(one.verdict) for one in judged[id].values()]
-            rows.append((claim.where, claim.claim, _add_unit(claim), claim.rule, claim.note, *cells))
-        columns = (
-            "where",
-            "claim",
-            "printed",
-            "rule",
-            "what is compared",
-            *(f"reading: {label}" for label in readings),
-        )
-        table = Table(name=name, columns=dict.fromkeys(columns, ""), rows=rows, prose=True)
-        words = "\n".join(f"- *{label}*: {sentence}" for label, sentence in readings.items())
-        return [Section(title=title, parts=(Prose(words), table), folded=True)]
+            row = {"where": claim.where, "claim": claim.claim, "printed": _add_unit(claim), "rule": claim.rule}
+            row["what is compared"] = claim.note
+            for reading, one in judged[id].items():
+                row[f"reading: {reading}"] = f"{one.verdict}: {one.here}" if one.here else str(one.verdict)
+            rows.append(row)
+        words = "\n".join(f"- *{label}*: {sentence}" for label, sentence in self._list_readings(ids[0]).items())
+        return [Section(title=title, parts=(Prose(words), tabulate(name, "", rows, prose=True)), folded=True)]
 
     def _tabulate_differences(self, results: Mapping[str, R], effort: E) -> Table:
         rows = []
@@ -275,13 +273,12 @@ class Paper(Generic[E, R]):
             effect = row.effect or (self.book.functions[row.id](results) if run else str(Ruling.NOT_RUN))
             if not isinstance(effect, str):
                 words = {
-                    name: value if isinstance(value, str) else f"{round(value, 6):.4g}"
-                    for name, value in effect.items()
+                    n: value if isinstance(value, str) else f"{round(value, 6):.4g}" for n, value in effect.items()
                 }
                 effect = "; ".join(f"{name}: {value}" for name, value in words.items())
-            rows.append((row.where, row.printed, row.here, row.option, effect))
-        headings = ("where", "printed", "here", "option", "effect")
-        return Table(name="differences", columns=dict.fromkeys(headings, ""), rows=rows, prose=True)
+            shown = {"where": row.where, "printed": row.printed, "here": row.here, "option": row.option}
+            rows.append({**shown, "effect": effect})
+        return tabulate("differences", "", rows, prose=True)
 
 
 def count_verdicts(verdicts: Mapping[str, Mapping[str, str]]) -> str:
@@ -302,4 +299,5 @@ def encode_part(part: Part) -> dict[str, Any]:
 
 
 def _add_unit(claim: ClaimRow) -> str:
-    return f"{claim.printed} {claim.unit}".strip() if claim.printed else ""
+    unit = "" if claim.parts[0] == "p <" else claim.unit  # which is that of the lead
+    return f"{claim.printed} {unit}".strip() if claim.printed else ""

@@ -117,11 +117,10 @@ def evaluate_point(spec: ProblemSpec, x: Sequence[float]) -> Mapping[str, float]
     return _evaluate(spec.name, *(tuple(sorted(part.items())) for part in (spec.options, spec.values)), tuple(x))
 
 
-def tabulate(name: str, caption: str, rows: Sequence[Mapping[str, Value]]) -> Table:
+def tabulate(name: str, caption: str, rows: Sequence[Mapping[str, Value]], *, prose: bool = False) -> Table:
     """Return a table of rows by heading, numbers to five digits."""
-    return Table(
-        name=name, columns=dict.fromkeys(rows[0], ".5g"), rows=[[*row.values()] for row in rows], caption=caption
-    )
+    columns, values = dict.fromkeys(rows[0], ".5g"), [[*row.values()] for row in rows]
+    return Table(name=name, columns=columns, rows=values, caption=caption, prose=prose)
 
 
 def tabulate_runs(records: Iterable[RunRecord]) -> Table:

@@ -19,6 +19,7 @@ from compare.papers.nao.results import (
     MARGINS,
     PHASES,
     PRINTED,
+    PRINTED_X,
     READINGS,
     SEARCHES,
     TIMES,
@@ -145,7 +146,7 @@ def list_swing_joints(result: NaoResults) -> list[float]:
 def compute_pace_loss(result: NaoResults, phase: str, end: int) -> float:
     """Return how far the least margin of PSO's printed path at the fastest (0) or slowest (-1) pace is below the best [%]."""
     problem, time = make_spec(phase, result.reading).load(), TIMES[phase]
-    x = dict(zip(problem.names, PRINTED[phase, "PSO"].x, strict=True))
+    x = dict(zip(problem.names, PRINTED_X[phase, "PSO"], strict=True))
     margins = []
     for at in np.geomspace(problem.value(f"{time}.lower"), problem.value(f"{time}.upper"), PACES).tolist():
         rates = {name: value * x[time] / at for name, value in x.items() if name.startswith("hip_v")}
@@ -156,14 +157,14 @@ def compute_pace_loss(result: NaoResults, phase: str, end: int) -> float:
 
 def compute_lateral_gain(result: NaoResults) -> float:
     """Return the change of the mean margin in y with half the lateral velocities [mm]."""
-    x6, x7 = PRINTED["ssp", "PSO"].x[5:7]
+    x6, x7 = PRINTED_X["ssp", "PSO"][5:7]
     halved = result.measure("ssp", hip_vy_start_m_s=x6 / 2, hip_vy_end_m_s=x7 / 2)
     return 1000 * (result.measure("ssp")["dbm_y_mean_m"] - halved["dbm_y_mean_m"])
 
 
 def list_arm_gains(result: NaoResults) -> list[float]:
     """Return the margin that gains most against arms at rest, in both phases [mm]."""
-    held = {p: evaluate_point(make_spec(p, result.reading, arms="held"), PRINTED[p, "PSO"].x) for p in PHASES}
+    held = {p: evaluate_point(make_spec(p, result.reading, arms="held"), PRINTED_X[p, "PSO"]) for p in PHASES}
     return [max(1000 * (result.measure(phase)[index] - held[phase][index]) for index in MARGINS) for phase in PHASES]
 
 
@@ -239,14 +240,10 @@ def measure_choice(results: Mapping[str, NaoResults], id: str) -> dict[str, floa
     options, effects = parse_settings(BOOK.differences[id].option)[0], dict[str, float]()
     kinds = {"ssp": ("margins of single support", MARGINS), "dsp": ("least margins of double support", MARGINS[:2])}
     for phase in ("dsp",) if id == "masses" else PHASES:
-        words, indexes = kinds[phase]
-        errors = []
+        (words, indexes), errors = kinds[phase], list[float]()
         for search in SEARCHES:
-            figures, printed = (
-                evaluate_point(make_spec(phase, "physical", **options), PRINTED[phase, search].x),
-                PRINTED[phase, search],
-            )
-            errors += [1000 * abs(figures[index] - printed.figures[index]) for index in indexes]
+            figures = evaluate_point(make_spec(phase, "physical", **options), PRINTED_X[phase, search])
+            errors += [1000 * abs(figures[index] - PRINTED[phase, search][index]) for index in indexes]
         effects[f"largest error of {words}, with this alone [mm]"] = max(errors)
         effects["without [mm]"], effects["with all [mm]"] = (
             max(map(abs, list_errors(results[reading], phase, indexes))) for reading in ("physical", "printed")
@@ -258,7 +255,7 @@ def measure_option(results: Mapping[str, NaoResults], id: str) -> dict[str, floa
     """Return the changes of PSO's printed solutions with the option of a difference."""
     options, effects = parse_settings(BOOK.differences[id].option)[0], dict[str, float]()
     for phase in ("dsp",) if id in ("lever", "arms-shared") else PHASES:  # of double support alone
-        after = evaluate_point(make_spec(phase, "printed", **options), PRINTED[phase, "PSO"].x)
+        after = evaluate_point(make_spec(phase, "printed", **options), PRINTED_X[phase, "PSO"])
         before = results["printed"].measure(phase)
         for name, index in zip(("power", "torque change"), KINDS.values(), strict=True):
             effects[f"{name} of {PHASES[phase]} [%]"] = 100 * (after[index] / before[index] - 1)

@@ -26,6 +26,7 @@ from metaheuristics.registry import make_algorithm
 from nlp_gait.formulation.signals import Signals
 
 FOLDER = Path(__file__).parent
+SOLUTIONS = FOLDER / "solutions.csv"
 PHASES = {"ssp": "single support", "dsp": "double support"}
 MARGINS = tuple(f"dbm_{axis}_{kind}_m" for kind in ("min", "mean") for axis in "xy")
 KINDS = {"power": "power_W", "torque": "torque_change_Nm"}
@@ -57,20 +58,9 @@ class NaoEffort(Effort):
     starts: int = 3  # of IPOPT at each optimum, and two for each point of a sweep
 
 
-@dataclass(frozen=True, kw_only=True)
-class PrintedSolution:
-    """A printed solution and its figures."""
-
-    x: tuple[float, ...]
-    figures: Mapping[str, float]
-
-
-PRINTED = {
-    (row["phase"], row["search"]): PrintedSolution(
-        x=tuple(map(float, row["x"].split())), figures={index: float(row[index]) for index in INDEXES}
-    )
-    for row in read_rows(FOLDER / "solutions.csv")
-}
+# Variables in the problem's order, and figures, of each printed solution
+PRINTED_X = {(row["phase"], row["search"]): tuple(map(float, row["x"].split())) for row in read_rows(SOLUTIONS)}
+PRINTED = {(row["phase"], row["search"]): {i: float(row[i]) for i in INDEXES} for row in read_rows(SOLUTIONS)}
 
 
 def make_spec(phase: str, reading: str, label: str = "", **options: Any) -> ProblemSpec:
@@ -103,7 +93,7 @@ class NaoResults:
     def change(self, phase: str, search: str, changes: Mapping[str, float]) -> list[float]:
         """Return a printed solution with other values of some variables."""
         names = make_spec(phase, self.reading).load().names
-        return list({**dict(zip(names, PRINTED[phase, search].x, strict=True)), **changes}.values())
+        return list({**dict(zip(names, PRINTED_X[phase, search], strict=True)), **changes}.values())
 
     def measure(self, phase: str, search: str = "PSO", /, **changes: float) -> Mapping[str, float]:
         """Return the figures of a printed solution, with other values of some variables."""
@@ -147,7 +137,7 @@ def _make_start_tasks(effort: NaoEffort) -> Iterator[Task]:
                 yield from _start_from_print(spec, phase, 1)
     for share, arms in SHARES:
         spec = make_spec("dsp", "printed", f"-{share}-{arms}", torso_share=share, arms=arms)
-        mean = evaluate_point(spec, PRINTED["dsp", "PSO"].x)["dbm_y_mean_m"]
+        mean = evaluate_point(spec, PRINTED_X["dsp", "PSO"])["dbm_y_mean_m"]
         spec = fix(replace(spec, values={"dbm_y_mean_limit_m": mean}), **{"hip_height_m": 0.31, TIMES["dsp"]: 2.0})
         yield from _start_from_print(spec, "dsp", 1)
 
@@ -155,7 +145,7 @@ def _make_start_tasks(effort: NaoEffort) -> Iterator[Task]:
 def _start_from_print(spec: ProblemSpec, phase: str, random: int) -> Iterator[Task]:
     """Yield a run of IPOPT from PSO's printed solution, and others from random points."""
     problem, settings = spec.load(), {"compiled": False}  # compiling takes longer than it saves
-    x = np.clip(PRINTED[phase, "PSO"].x, problem.lower, problem.upper)
+    x = np.clip(PRINTED_X[phase, "PSO"], problem.lower, problem.upper)
     yield Task(problem=spec, solver=IPOPT, settings=settings, start=problem.by_name(x))
     for task in make_start_tasks(spec, random, settings=settings):
         yield replace(task, run=task.run + 1)

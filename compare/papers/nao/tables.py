@@ -14,6 +14,7 @@ from compare.papers.nao.results import (
     MARGINS,
     PHASES,
     PRINTED,
+    PRINTED_X,
     READINGS,
     SEARCHES,
     SHARES,
@@ -34,7 +35,7 @@ def list_margins(result: NaoResults, phase: str, indexes: Sequence[str] = MARGIN
 
 def list_errors(result: NaoResults, phase: str, indexes: Sequence[str] = MARGINS) -> list[float]:
     """Return the margins of the printed solutions here, less the printed ones [mm]."""
-    printed = [1000 * PRINTED[phase, search].figures[index] for search in SEARCHES for index in indexes]
+    printed = [1000 * PRINTED[phase, search][index] for search in SEARCHES for index in indexes]
     return list(np.subtract(list_margins(result, phase, indexes), printed))
 
 
@@ -73,8 +74,8 @@ def show(results: Mapping[str, NaoResults]) -> list[Part]:
 
 def explain(result: NaoResults) -> str:
     """Return what stays unexplained."""
-    missing = [PRINTED["ssp", s].figures["power_W"] - result.measure("ssp", s)["power_W"] for s in SEARCHES]
-    torques = [list_levels(result, "dsp", "torque"), [PRINTED["dsp", s].figures["torque_change_Nm"] for s in SEARCHES]]
+    missing = [PRINTED["ssp", s]["power_W"] - result.measure("ssp", s)["power_W"] for s in SEARCHES]
+    torques = [list_levels(result, "dsp", "torque"), [PRINTED["dsp", s]["torque_change_Nm"] for s in SEARCHES]]
     here, printed = (" / ".join(f"{value:.3f}" for value in values) for values in torques)
     means = list_errors(result, "dsp")[2:4]
     return (
@@ -89,13 +90,13 @@ def tabulate_phase(results: Mapping[str, NaoResults], phase: str) -> Table:
     """Return variables and figures of a phase: printed, of the printed solutions here, and of IPOPT's optima."""
     names, columns = make_spec(phase, "physical").load().names, dict[str, Mapping[str, float]]()
     for search in SEARCHES:
-        printed = PRINTED[phase, search]
-        columns[f"{search}, paper"] = {**dict(zip(names, printed.x, strict=True)), **printed.figures}
+        x = PRINTED_X[phase, search]
+        columns[f"{search}, paper"] = {**dict(zip(names, x, strict=True)), **PRINTED[phase, search]}
         for reading in READINGS:
             columns[f"{search}, {reading} reading"] = results[reading].measure(phase, search)
         for robot in ("v4", "v6"):
             spec = make_spec(phase, "printed", robot=f"nao-{robot}")
-            columns[f"{search}, printed reading, {robot.upper()}"] = evaluate_point(spec, printed.x)
+            columns[f"{search}, printed reading, {robot.upper()}"] = evaluate_point(spec, x)
     for reading in READINGS:
         best = results[reading].best(make_spec(phase, reading))
         columns[f"IPOPT, {reading} reading"] = {**best.x, **best.verdict.indexes}
@@ -123,7 +124,7 @@ def tabulate_shares(result: NaoResults) -> Table:
     rows = []
     for share, arms in SHARES:
         spec = make_spec("dsp", "printed", f"-{share}-{arms}", torso_share=share, arms=arms)
-        power, best = evaluate_point(spec, PRINTED["dsp", "PSO"].x)["power_W"], result.best(spec).verdict
+        power, best = evaluate_point(spec, PRINTED_X["dsp", "PSO"])["power_W"], result.best(spec).verdict
         excess = 100 * (power / best.objective - 1) if best.feasible else None
         words = {"share of the torso": share, "arms": arms}
         rows.append({**words, "PSO's solution [W]": power, "above the optimum [%]": excess})
@@ -136,7 +137,7 @@ def tabulate_causes(result: NaoResults) -> Table:
     swings = {float(row["swing_height_m"]): float(row["PSO_W"]) for row in read_rows(FOLDER / "swing_heights.csv")}
     gaits = {"PSO": ("PSO", 0.015), "GA": ("GA", 0.015), "0.018": ("PSO", 0.018), "0.022": ("PSO", 0.022)}
     drawn = {name: compute_powers(result, search, swing_height_m=at) for name, (search, at) in gaits.items()}
-    printed = {"PSO": swings[0.015], "GA": PRINTED["ssp", "GA"].figures["power_W"]}
+    printed = {"PSO": swings[0.015], "GA": PRINTED["ssp", "GA"]["power_W"]}
     printed |= {name: swings[float(name)] for name in ("0.018", "0.022")}
     rows = list[Mapping[str, Value]]()
     for cause in [{"cause": "printed"}, *read_rows(FOLDER / "causes.csv")]:
