@@ -182,7 +182,7 @@ class Paper(Generic[E, R]):
             "settings": {k: v for k, v in asdict(effort).items() if v != getattr(self.full, k)},
             "session": asdict(session),
             "verdicts": verdicts,
-            "parts": [encode_part(part) for part in parts if not isinstance(part, Figure)],
+            "parts": [encode_part(part) for part in parts],
         }
         write_json(folder / "summary.json", record)
         settings = [(name, format_settings(value)) for name, value in asdict(effort).items()]
@@ -289,12 +289,14 @@ def count_verdicts(verdicts: Mapping[str, Mapping[str, str]]) -> str:
 
 
 def encode_part(part: Part) -> dict[str, Any]:
-    """Return a text, table or section as plain data, with the cells as the page shows them."""
+    """Return a part as plain data, with the cells as the page shows them; of a figure its name and caption."""
     if isinstance(part, Section):
         return {"title": part.title, "parts": [encode_part(child) for child in part.parts]}
     if isinstance(part, Table):
         rows = [[cell.text for cell in row] for row in part.cells]
         return {"caption": part.caption, "columns": [*part.columns], "rows": rows}
+    if isinstance(part, Figure):
+        return {"figure": part.name, "caption": part.caption}
     return {"text": part.markdown if isinstance(part, Prose) else str(part)}
 
 

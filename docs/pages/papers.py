@@ -45,15 +45,23 @@ def paper_page(name: str) -> str:
         f"Computed by `{session['command']}`, version {session['versions']['nlp-gait']}, on {session['started'][:10]}, "
         f"{session['machine']['processor']}."
     )
-    return page(literal(count_verdicts(record["verdicts"])), *_format_parts(record["parts"]), literal(words))
+    return page(literal(count_verdicts(record["verdicts"])), *_format_parts(name, record["parts"]), literal(words))
 
 
-def _format_parts(parts: Iterable[dict[str, Any]]) -> list[str]:
+def _format_parts(name: str, parts: Iterable[dict[str, Any]]) -> list[str]:
     """Return texts, tables, and sections, which the page folds."""
     blocks: list[str] = []
     for part in parts:
         if "title" in part:
-            blocks += [f"<details><summary>{part['title']}</summary>", *_format_parts(part["parts"]), "</details>"]
+            blocks += [
+                f"<details><summary>{part['title']}</summary>",
+                *_format_parts(name, part["parts"]),
+                "</details>",
+            ]
+        elif "figure" in part:
+            blocks.append(
+                f"```{{image}} /papers/{name}.svg\n:alt: {part['caption']}\n```\n\n{literal(part['caption'])}"
+            )
         elif "columns" in part:
             blocks += [literal(part["caption"])] if part["caption"] else []
             blocks.append(table([*map(literal, part["columns"])], ([*map(literal, row)] for row in part["rows"])))
