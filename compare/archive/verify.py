@@ -1,81 +1,100 @@
-"""Verification of a study: what holds and what does not, in a folder or in an archive."""
+"""Verification of a study: what holds, what does not and what was not checked, in a folder or in an archive.
+
+What can be computed is computed again and compared: every point, random runs, report and tables. Times stay as recorded.
+"""
 
 import random
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
 from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
-from compare.analysis.comparison import compare_problems
-from compare.archive.unpack import unpack_archive
-from compare.report.study_report import make_study_document
-from compare.report.writing import render_markdown
-from compare.study.evidence import name_record, read_evidence
+from compare.archive.unpack import MANIFEST, unpack_archive
+from compare.report import FurtherFiles, write_report
+from compare.study.evidence import CheckedRecords, map_in_forks, name_record, read_evidence
 from compare.study.origin import hash_installed_code
 from compare.study.record import RunRecord, load_problem
-from compare.study.record_files import RECORDS
+from compare.study.record_files import RECORDS, name_run
 from compare.study.run_task import try_task
 from compare.study.settings import FILE, Manifest, read_manifest
 from compare.study.task import SOURCE, Handling, Inputs, ProblemSpec, Stop, Task
 from nlp_gait.backends.identity import FILES
 from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError
-from nlp_gait.files import make_temporary_folder, read_text
+from nlp_gait.files import make_temporary_folder, read_bytes
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.proofs.certificate import check_certificate, load_certificates, read_certificate
-from nlp_gait.user_code import hash_file, parse_reference, resolve_code
+from nlp_gait.user_code import hash_file, is_user_code, parse_reference, resolve_code
 
-REPORT = "report.md"
 # What a repeated run must have in common with its record: everything but the times.
-REPEATED = ("status", "x", "evaluations", "history", "failed_evaluations", "iterations", "claimed_objective", "verdict")
+REPEATED = (
+    *("settings", "status", "claimed", "x", "claimed_objective", "claimed_violation", "verdict", "evaluations"),
+    *("failed_evaluations", "iterations", "active_constraints", "history"),
+)
+# By default one run of each solver and problem is repeated, and further ones for so long [s].
+FURTHER_S = 2.0
+MOST_CERTIFICATES = 20  # whose proofs are followed in one call
+PAGES = ("report.html", "report.md")
+OF_ARCHIVES = (MANIFEST, FILE, "README.md", "requirements.txt")
+MOST_NAMED = 5  # runs or files in a sentence
+
+
+class NotCheckedError(GaitError):
+    """Something cannot be checked here."""
 
 
 class Finding(NamedTuple):
     """One check."""
 
     what: str  #: that was checked
-    holds: bool
-    detail: str  #: numbers, or what does not hold
+    holds: bool | None  #: None: not checked
+    detail: str  #: numbers, what does not hold, or why it was not checked
 
     @property
     def sentence(self) -> str:
         """The finding as one line."""
-        return f"{self.what}: {'holds' if self.holds else 'DOES NOT HOLD'}: {self.detail}"
+        word = "not checked" if self.holds is None else "holds" if self.holds else "DOES NOT HOLD"
+        return f"{self.what}: {word}: {self.detail}"
 
 
 class Verification(NamedTuple):
-    """All checks, and the records that passed theirs."""
+    """All checks, the records that passed theirs, and two lines: what was evaluated and repeated, and what was not."""
 
     findings: list[Finding]
     records: list[RunRecord]
+    scope: tuple[str, ...] = ()
 
 
-def verify_archive(path: Path, *, share: float = 0.0, progress: Progress = ignore_progress) -> Verification:
-    """Check an archive as ``verify_folder``, and its hashes, user code and report; raises InputError if it cannot be unpacked."""
+def verify_archive(path: Path, *, share: float | None = None, progress: Progress = ignore_progress) -> Verification:
+    """Check an archive as ``verify_folder``, and its hashes and user code; raises InputError if it cannot be unpacked."""
     with make_temporary_folder("nlp-gait-verify-") as folder:
         manifest, differences = unpack_archive(path, folder)
         detail = "; ".join(differences) or f"{len(manifest.files)} files have their SHA-256 of the manifest"
         found = verify_folder(folder, share=share, robots=manifest.robots, progress=progress)
-        findings = [Finding("manifest", not differences, detail), *found.findings]
-        if found.records:
-            findings += _check_code_files(folder, found.records)
-            findings.append(_judge(REPORT, lambda: _check_report(folder, found.records)))
-        return Verification(findings, found.records)
+        codes = _check_code_files(folder, found.records)
+        return found._replace(findings=[Finding("manifest", not differences, detail), *found.findings, *codes])
 
 
 def verify_folder(
-    folder: Path, *, share: float = 0.0, robots: Mapping[str, str] | None = None, progress: Progress = ignore_progress
+    folder: Path,
+    *,
+    share: float | None = None,
+    robots: Mapping[str, str] | None = None,
+    progress: Progress = ignore_progress,
 ) -> Verification:
     """Check everything in a study's folder that can be checked.
 
     Args:
         folder: of the study.
-        share: of the runs that are repeated, drawn at random, from 0 to 1; at least one if it is positive.
+        share: of the runs that are repeated, drawn at random, from 0 to 1; None for one run of each solver and problem, the run
+            whose prices are shown, and further runs for two seconds.
         robots: files that stand for the options of problems that name files, relative to the folder.
         progress: receives a line for each repeated run.
     """
@@ -85,29 +104,49 @@ def verify_folder(
         return load_problem(_move_files(record, places))
 
     try:
-        records, excluded = read_evidence(folder, "all", find_problem)
+        evidence, manifest = read_evidence(folder, "all", find_problem), read_manifest(folder)
     except InputError as error:
         return Verification([Finding("records", False, str(error))], [])
-    count, wrong = len(records) + len(excluded), "; ".join(exclusion.sentence for exclusion in excluded)
-    detail = (
-        f"{len(excluded)} of {count} are no evidence: {wrong}" if excluded else f"all {count} follow from their points"
-    )
-    findings = [Finding("records", not excluded, detail + ", also between the samples" * (not excluded))]
-    findings.append(_judge(FILE, lambda: _check_sessions(records, read_manifest(folder))))
-    findings.append(_judge("runs", lambda: _check_runs(folder)))
-    for path in sorted((folder / "certificates").glob("*.json")):
-        findings.append(_judge(f"certificates/{path.name}", partial(_check_certificate, path)))
-    if share > 0.0:
-        findings += _repeat_runs(records, share, places, progress)
-    return Verification(findings, records)
+    records = evidence.records
+    findings = list(_report_evidence(evidence))
+    findings.append(_judge(FILE, lambda: _check_sessions(records, manifest)))
+    everyone = [*records, *(e.record for e in evidence.excluded if e.record is not None)]
+    findings.append(_judge("runs", lambda: _check_plan(folder, manifest, everyone)))
+    for number, path in enumerate(sorted((folder / "certificates").glob("*.json"))):
+        findings.append(_judge(f"certificates/{path.name}", partial(_check_certificate, path, number)))
+    rewritten = _judge("texts", lambda: _check_texts(folder, records, manifest, evidence))
+    repeated = list(_repeat_runs(records, share, places, progress))
+    scope = _describe_scope(folder, records, manifest, sum(f.holds is not None for f in repeated))
+    return Verification([*findings, rewritten, *repeated], records, scope)
 
 
 def _judge(what: str, check: Callable[[], str]) -> Finding:
     """Return the finding of a check, which returns what holds, and raises what does not."""
     try:
         return Finding(what, True, check())
+    except NotCheckedError as error:
+        return Finding(what, None, str(error))
     except GaitError as error:
         return Finding(what, False, str(error))
+
+
+def _report_evidence(evidence: CheckedRecords) -> Iterator[Finding]:
+    wrong = [exclusion for exclusion in evidence.excluded if not exclusion.needs_code]
+    unread = [exclusion for exclusion in evidence.excluded if exclusion.needs_code]
+    count = len(evidence.records) + len(wrong)
+    no_evidence = f"{len(wrong)} of {count} are no evidence: {'; '.join(e.sentence for e in wrong)}"
+    follow = f"all {count} follow from their points, also between the samples"
+    yield Finding("records", not wrong, no_evidence if wrong else follow)
+    if unread:
+        yield Finding("records of user code", None, f"{len(unread)}: {unread[0].sentence}")
+    imported = [name_record(record) for record in evidence.records if record.inputs.imported]
+    if imported:
+        yield Finding("imported runs", None, f"counts, histories and seeds are claims: {_list_some(imported)}")
+
+
+def _list_some(names: Sequence[str]) -> str:
+    more = len(names) - MOST_NAMED
+    return f"{', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''}"
 
 
 def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> str:
@@ -132,24 +171,64 @@ def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> str:
         raise InputError("; ".join(wrong))
     installed = hash_installed_code()
     other = any(record.inputs.code != installed for record, _ in own)
-    note = f"; other code is installed here ({installed[:8]}), so runs cannot be repeated" if other else ""
+    note = f"; other code is installed here ({installed[:8]})" if other else ""
     return f"runs computed in a recorded session: {len(own)} of {len(own)}{note}"
 
 
-def _check_runs(folder: Path) -> str:
-    """Require a record of every run of the study."""
-    runs = read_manifest(folder).runs
-    missing = [name for name in runs if not (folder / RECORDS / f"{name}.json").is_file()]
-    if missing:
-        raise InputError(f"{len(missing)} of {len(runs)} have no record: {', '.join(missing)}")
-    return f"all {len(runs)} that {FILE} lists have a record"
+def _check_plan(folder: Path, manifest: Manifest, records: Sequence[RunRecord]) -> str:
+    """Compare the runs with those that ``study.json`` lists and plans; numbers and seeds of a solver's runs have no gaps."""
+    there = {(r.problem, r.solver, r.run): r for r in records if not r.inputs.imported}
+    settings = manifest.settings
+    planned = {(t.problem.title, t.title, t.run): t for t in (() if settings is None else settings.tasks())}
+    wrong = [f"{name} has no record" for name in manifest.runs if not (folder / RECORDS / f"{name}.json").is_file()]
+    for key in planned.keys() - there.keys():
+        wrong.append(f"{key[0]}, {key[1]}, run {key[2]} is planned, but missing")
+    groups: dict[tuple[str, str], list[RunRecord]] = defaultdict(list)
+    for key, record in there.items():
+        groups[key[:2]].append(record)
+        if task := planned.get(key):
+            wrong += [f"{name_record(record)} has other {what} than planned" for what in _find_deviations(record, task)]
+    commanded = {key[:2] for key in planned}
+    for group, runs in groups.items():
+        if group in commanded:
+            wrong += [f"{name_record(r)} is not planned" for r in runs if (r.problem, r.solver, r.run) not in planned]
+        elif {r.run for r in runs} != set(range(len(runs))) or len({r.seed - r.run for r in runs}) > 1:
+            wrong.append(f"the runs or seeds of {group[1]} on {group[0]} have gaps")
+    if wrong:
+        raise InputError(f"{len(wrong)} differ: {_list_some(sorted(wrong))}")
+    return f"all {len(manifest.runs)} that {FILE} lists have a record; {len(planned)} are planned by its settings"
 
 
-def _check_certificate(path: Path) -> str:
+def _find_deviations(record: RunRecord, task: Task) -> Iterator[str]:
+    """Yield what of a record's inputs is not as its task plans it."""
+    inputs, problem = record.inputs, record.inputs.problem
+    solver = inputs.solver["name"] if isinstance(inputs.solver, Mapping) else inputs.solver
+    same_solver = solver == task.solver or task.is_user_code
+    limits = {name: value for name, value in asdict(task.stop).items() if value is not None}
+    spec = task.problem
+    for what, is_same in (
+        ("seed", inputs.seed == task.run_seed),
+        ("solver", same_solver and inputs.polish == task.polish),
+        ("settings", dict(inputs.settings) == dict(task.settings)),
+        ("constraint handling", inputs.handling in (None, task.handling)),
+        ("limits", inputs.stop.items() <= limits.items() and (not inputs.is_search or inputs.stop == limits)),
+        ("problem", problem["name"] == spec.address or is_user_code(spec.address, "problem")),
+        ("options", spec.options.items() <= {**problem["options"]}.items()),
+        ("parameters", dict(problem["parameters"]) == dict(spec.values)),
+    ):
+        if not is_same:
+            yield what
+
+
+def _check_certificate(path: Path, number: int) -> str:
     """Compare an archived certificate with the shipped ones; another one is checked as by ``certainty --check``."""
     file = read_certificate(path)
-    shipped = any(file == other for other in load_certificates().values())
-    how = "equal to the shipped one" if shipped else f"{check_certificate(file).paths} paths of its proof followed"
+    if any(file == other for other in load_certificates().values()):
+        how = "equal to the shipped one"
+    elif number >= MOST_CERTIFICATES:
+        raise NotCheckedError(f"{MOST_CERTIFICATES} are checked in one call; check it by certainty --check")
+    else:
+        how = f"{check_certificate(file).paths} paths of its proof followed"
     return f"bound {file.certificate.bound:.9g}, {how}"
 
 
@@ -166,41 +245,101 @@ def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Findin
     return findings
 
 
-def _check_report(folder: Path, records: Sequence[RunRecord]) -> str:
-    """Write the report again, and compare its text."""
-    comparisons = compare_problems(records)
-    document = make_study_document(comparisons, read_manifest(folder))
-    again = render_markdown(document).split("\n")
-    known = read_text(folder / REPORT, "report").split("\n")
-    for number, (a, b) in enumerate(zip_longest(known, again), start=1):
-        if a != b:
-            raise InputError(f"line {number} is {a!r:.100}, but the records give {b!r:.100}")
-    return "it follows from the records"
+def _check_texts(folder: Path, records: Sequence[RunRecord], manifest: Manifest, evidence: CheckedRecords) -> str:
+    """Write the report, its figures and tables again, and compare all that are there."""
+    if not any((folder / name).exists() for name in PAGES):
+        raise NotCheckedError("there is no report")
+    if any(exclusion.needs_code for exclusion in evidence.excluded):
+        raise NotCheckedError("the report needs the records of user code")
+    with make_temporary_folder("nlp-gait-report-") as fresh:
+        further = FurtherFiles(csv=(folder / "runs.csv").exists())
+        written = write_report(fresh, records, manifest, excluded=evidence.excluded, further=further)
+        missing = [path.name for path in written if not (folder / path.name).exists()]
+        if missing:
+            raise InputError(f"{_list_some(missing)} should be there")
+        for path in written:
+            known, again = read_bytes(folder / path.name, "text"), path.read_bytes()
+            if known != again:
+                pairs = zip_longest(known.decode(errors="replace").split("\n"), again.decode().split("\n"))
+                number, a, b = next((n, a, b) for n, (a, b) in enumerate(pairs, start=1) if a != b)
+                raise InputError(
+                    f"line {number} of {path.name} is {a!r:.100}, but the records give {b!r:.100}; if weights were given, or "
+                    "another version wrote it, write it again with `report`"
+                )
+    return f"{_list_some([path.name for path in written])} follow from the records"
+
+
+def _describe_scope(folder: Path, records: Sequence[RunRecord], manifest: Manifest, repeated: int) -> tuple[str, str]:
+    """Return a line about what was evaluated and repeated, and one about what was not checked."""
+    listed = {name_run(record) for record in records}
+    others = sum(path.relative_to(folder / RECORDS).with_suffix("").as_posix() not in listed
+                 for path in (folder / RECORDS).glob("*/*.json"))  # fmt: skip
+    parts = [f"the course of {len(records) - repeated} runs that were not repeated", "times and machines: as recorded"]
+    parts += ["runs that were made, but never listed"]
+    parts += [f"{others} other records in the folder"] if others else []
+    foreign = [p.name for p in sorted(folder.iterdir()) if p.is_file() and p.suffix in (".tex", ".pdf", ".png")]
+    parts += [f"{_list_some(foreign)}"] if foreign else []
+    points = sum(bool(record.x) for record in records)
+    done = f"evaluated: {points} points; repeated: {repeated} of {len(records)} runs, drawn at random"
+    return done, f"not checked: {'; '.join(parts)}"
+
+
+def _choose_runs(records: Sequence[RunRecord], share: float | None) -> tuple[list[RunRecord], int]:
+    """Return the runs to repeat in random order, and how many of them must be; a forger cannot predict which."""
+    known = [record for record in records if not record.inputs.imported]
+    random.SystemRandom().shuffle(known)
+    if share is not None:
+        count = round(share * len(known)) if share == 0.0 else max(1, round(share * len(known)))
+        return known[:count], count
+    first: dict[object, RunRecord] = {}
+    priced = [r for r in known if r.active_constraints and r.verdict.feasible]
+    priced.sort(key=lambda r: r.inputs.objective.sign * r.verdict.objective)
+    for record in priced:  # the report shows the prices of the best one
+        first.setdefault(record.problem, record)
+    for record in known:
+        first.setdefault((record.problem, record.solver), record)
+    needed = list({id(record): record for record in first.values()}.values())
+    chosen = {id(record) for record in needed}
+    return [*needed, *(record for record in known if id(record) not in chosen)], len(needed)
 
 
 def _repeat_runs(
-    records: Sequence[RunRecord], share: float, places: Mapping[str, str], progress: Progress
-) -> list[Finding]:
-    known = [record for record in records if not record.inputs.imported and record.x]
-    chosen = random.SystemRandom().sample(known, min(len(known), max(1, round(share * len(known)))))
-    findings = []
-    for record in chosen:
-        progress(name_record(record))
-        repeat = partial(_repeat_run, record, _move_files(record, places))
-        findings.append(_judge(f"repeated: {name_record(record)}", repeat))
-    return findings
+    records: Sequence[RunRecord], share: float | None, places: Mapping[str, str], progress: Progress
+) -> Iterator[Finding]:
+    chosen, needed = _choose_runs(records, share)
+
+    def repeat(record: RunRecord) -> Finding:
+        call = partial(_repeat_run, record, _move_files(record, places))
+        return _judge(f"repeated: {name_record(record)}", call)
+
+    began, findings = time.monotonic(), list[Finding]()
+    for record in chosen[:needed]:  # built before the forks
+        load_problem(_move_files(record, places))
+    for finding in map_in_forks(repeat, chosen[:needed]):
+        progress(finding.what)
+        findings.append(finding)
+    for finding in map_in_forks(repeat, chosen[needed:], lambda: time.monotonic() - began > FURTHER_S):
+        progress(finding.what)
+        findings.append(finding)
+    wrong = [finding for finding in findings if not finding.holds]
+    same = len(findings) - len(wrong)
+    if same:
+        yield from wrong
+        yield Finding("repeated runs", True, f"{same}, to the last bit")
+    else:
+        yield from wrong
 
 
 def _repeat_run(record: RunRecord, moved: RunRecord) -> str:
     """Repeat a run, whose files may have moved: the same seed gives the same bits."""
-    try:
-        again = try_task(_make_task(record, moved.inputs))
-    except (GaitError, ValueError) as error:
-        raise InputError(f"it cannot be repeated: {error}") from error
+    again = try_task(_make_task(record, moved.inputs))
     for what in REPEATED:
         before, now = getattr(record, what), getattr(again, what)
         if before != now and repr(before) != repr(now):  # NaN differs from itself
-            raise InputError(f"its {what.replace('_', ' ')} differs: recorded {before!r:.100}, found {now!r:.100}")
+            text = f"its {what.replace('_', ' ')} differs: recorded {before!r:.100}, found {now!r:.100}"
+            if record.inputs.code != again.inputs.code:
+                raise NotCheckedError(f"{text}; other code is installed here")
+            raise InputError(text)
     return f"the same {record.evaluations['f']} evaluations, point and history, to the last bit"
 
 
@@ -208,16 +347,18 @@ def _make_task(record: RunRecord, inputs: Inputs) -> Task:
     """Return the task of a record by its inputs, in which files of the problem may be elsewhere than in the record's.
 
     Raises:
-        InputError: the run ended by the clock, or its solver was an object in Python, or its inputs differ here.
-        UserCodeError: it needs user code that the command does not name.
+        NotCheckedError: the run ended by the clock, its solver was an object in Python, or it needs other code than here.
     """
     solver, stored = inputs.solver, decode(StoredProblem, inputs.problem, "problem")
     if not isinstance(solver, str):
         if "name" not in solver:
-            raise InputError("its solver was an object of Python, which has no name")
-        solver = resolve_code(solver["name"], "algorithm", "the run")
+            raise NotCheckedError("its solver was an object of Python, which has no name")
+        try:
+            solver = resolve_code(solver["name"], "algorithm", "the run")
+        except GaitError as error:
+            raise NotCheckedError(str(error)) from error
     if inputs.stop.get("time_limit_s") is not None:
-        raise InputError("it ended by the clock or could have")
+        raise NotCheckedError("it ended by the clock or could have")
     name, options = resolve_stored(stored.name, stored.options, "the run")
     task = Task(
         problem=ProblemSpec(name=name, options=options, values=stored.parameters, label=record.problem),
@@ -231,8 +372,8 @@ def _make_task(record: RunRecord, inputs: Inputs) -> Task:
         polish=inputs.polish,
         start=inputs.start,
     )
-    if task.inputs().key != record.inputs.key:
-        raise InputError("its solver, code or problem is another one here")
+    if replace(task.inputs(), code=record.inputs.code).key != record.inputs.key:
+        raise NotCheckedError("its solver or problem is another one here")
     return task
 
 

@@ -1,6 +1,8 @@
 """Options that several commands take; ``command`` explains groups of options."""
 
 import inspect
+import math
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +18,7 @@ from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.user_code import allow_code, is_reference
 
+LARGEST = sys.float_info.max
 RESULTS = Path("results")  # default folder
 Starts = Annotated[
     int, Option(min=1, max=100000, help="Random starts within the bounds, where nothing better is known.")
@@ -141,17 +144,21 @@ def parse_names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
-def parse_numbers(name: str, text: str, flag: str) -> list[float]:
+def parse_numbers(name: str, text: str, flag: str, *, least: float = -LARGEST, most: float = LARGEST) -> list[float]:
     """Return comma-separated numbers; raises as ``parse_number``."""
-    return [parse_number(name, word, flag) for word in text.split(",")]
+    return [parse_number(name, word, flag, least=least, most=most) for word in text.split(",")]
 
 
-def parse_number(name: str, text: str, flag: str) -> float:
-    """Return a number; InputError if the text is not one."""
+def parse_number(name: str, text: str, flag: str, *, least: float = -LARGEST, most: float = LARGEST) -> float:
+    """Return a finite number within its limits; InputError if the text is none."""
     try:
-        return float(text)
+        value = float(text)
     except ValueError:
-        raise InputError(f"{flag}: {name} must be a number, got {text!r}") from None
+        value = math.nan
+    if not least <= value <= most:  # NaN fails too
+        limits = "" if most == LARGEST and least == -LARGEST else f" from {least:g} to {most:g}"
+        raise InputError(f"{flag}: {name} must be a finite number{limits}, got {text!r}")
+    return value
 
 
 def parse_pairs(items: Sequence[str] | None, flag: str) -> list[tuple[str, str]]:

@@ -3,13 +3,12 @@
 Every point is evaluated again by the exact functions, all points of a problem at once.
 """
 
-import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -21,9 +20,15 @@ from compare.study.references import SAME_VALUE, find_reference
 from nlp_gait.backends.exact import ExactValues, build_exact_model
 from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
 from nlp_gait.backends.kernel.compiled import compile_objective
-from nlp_gait.errors import GaitError, InputError
+from nlp_gait.backends.solve import count_workers
+from nlp_gait.errors import GaitError, InputError, UserCodeError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.interrupts import never
+from nlp_gait.processes import run_in_forks
+
+T = TypeVar("T")
+R = TypeVar("R")
 
 # Up to this many points of a problem are evaluated by CasADi, a third of a millisecond each; more by the compiled objective.
 MOST_INTERPRETED = 1000
@@ -32,10 +37,6 @@ SLACK = 1e-4
 # Relative difference of the last value of a history from the judged one: exact for searches, lifted for NLP solvers, and rounded
 # for imported runs.
 END_OF_SEARCH, END_OF_SOLVER, END_OF_IMPORT = 1e-9, 1e-5, 1e-3
-# Reason by which every search ends whose budget is used, see ``metaheuristics.minimize``.
-BUDGET_USED = "evaluation budget used"
-# Histories with at least this many different values are never equal by chance.
-TELLING = 3
 
 
 class Exclusion(NamedTuple):
@@ -44,6 +45,7 @@ class Exclusion(NamedTuple):
     name: str  #: problem, solver and run, or the file
     reasons: tuple[str, ...]
     record: RunRecord | None = None  #: None for a file that cannot be read
+    needs_code: bool = False  #: that the command does not name, so that nothing was evaluated
 
     @property
     def sentence(self) -> str:
@@ -71,6 +73,7 @@ class Context:
     """What a record is compared with."""
 
     problem: GaitProblem | None = None  #: None if it cannot be loaded
+    needs_code: bool = False  #: that the command does not name
     objections: list[str] = field(default_factory=list)  #: to the problem or the point, which prevent an evaluation
     objective: float | None = None  #: at its x, by the compiled functions or else as ``exact``; None if not evaluated
     violation: float = math.nan  #: likewise
@@ -101,9 +104,14 @@ def check_records(
     contexts = _make_contexts(records, find_problem or load_problem)
     pairs = list(zip(records, contexts, strict=True))
     reasons = [[reason for check in CHECKS if (reason := check(*pair))] for pair in pairs]
-    for k in _choose_runs(pairs, reasons, between_samples):
-        reasons[k] += [reason] if (reason := check_between_samples(*pairs[k])) else []
-    excluded = [Exclusion(name_record(r), tuple(why), r) for r, why in zip(records, reasons, strict=True) if why]
+    chosen = list(_choose_runs(pairs, reasons, between_samples))
+    for k, reason in zip(chosen, map_in_forks(lambda k: check_between_samples(*pairs[k]), chosen), strict=True):
+        reasons[k] += [reason] if reason else []
+    excluded = [
+        Exclusion(name_record(r), tuple(why), r, context.needs_code)
+        for (r, context), why in zip(pairs, reasons, strict=True)
+        if why
+    ]
     return CheckedRecords([record for record, why in zip(records, reasons, strict=True) if not why], excluded)
 
 
@@ -139,6 +147,18 @@ def group_by(records: Sequence[RunRecord], key: Callable[[RunRecord], object]) -
     return list(groups.values())
 
 
+def map_in_forks(call: Callable[[T], R], items: Sequence[T], stop: Callable[[], bool] = never) -> Iterator[R]:
+    """Yield call(item) of each item in order, in forks where they pay; after ``stop`` returns True, no further one is begun."""
+    workers = min(count_workers(), len(items) // 2)
+    if workers > 1:
+        yield from run_in_forks(lambda k, _: call(items[k]), len(items), workers, stop)
+        return
+    for item in items:
+        if stop():
+            return
+        yield call(item)
+
+
 def is_same(a: float, b: float, scale: float = 0.0) -> bool:
     """Return whether two numbers agree to nine digits; numbers that are not finite agree with their kind."""
     if not (math.isfinite(a) and math.isfinite(b)):
@@ -157,6 +177,7 @@ def _make_contexts(records: Sequence[RunRecord], find_problem: Callable[[RunReco
             bound = find_reference(stored).bound
         except (GaitError, ValueError) as error:
             for k in group:
+                contexts[k].needs_code = isinstance(error, UserCodeError)
                 contexts[k].objections.append(f"its problem cannot be evaluated: {error}")
             continue
         for k in group:
@@ -175,20 +196,9 @@ def _make_contexts(records: Sequence[RunRecord], find_problem: Callable[[RunReco
 
 
 def _list_marks(record: RunRecord) -> dict[str, tuple[object, ...]]:
-    """Return what only one record may have, or what all runs of a solver share, by kind."""
+    """Return what all runs of a label or of a solver share, and what only one run of a solver may have, by kind."""
     solver = record.problem, record.solver, record.inputs.solver_key
-    marks: dict[str, tuple[object, ...]] = {
-        "label": (record.problem, record.solver),
-        "solver": solver,
-        "seed": (*solver, record.seed),
-    }
-    if record.inputs.imported:
-        return marks
-    if record.time_s.solve > 0.0:
-        marks["times"] = (record.problem, record.time_s.solve, *record.time_s.history)
-    if record.inputs.handling is not None and len(set(record.history.objective)) >= TELLING:
-        marks["history"] = (*solver, *record.history.objective, *record.history.evaluations)
-    return marks
+    return {"label": solver[:2], "solver": solver, "seed": (*solver, record.seed)}
 
 
 def _evaluate_points(problem: GaitProblem, pairs: Sequence[tuple[RunRecord, Context]]) -> None:
@@ -204,7 +214,7 @@ def _evaluate_points(problem: GaitProblem, pairs: Sequence[tuple[RunRecord, Cont
         costs, violations = compile_objective(problem)(np.array([x for _, _, x in points]))
         for (_, context, _), cost, violation in zip(points, costs.tolist(), violations.tolist(), strict=True):
             context.objective, context.violation = sign * cost, math.inf if math.isnan(violation) else violation
-        points = [point for point in points if check_objective(*point[:2]) or check_violation(*point[:2])]
+        points = [point for point in points if check_verdict(*point[:2])]
     model = build_exact_model(problem)
     for _, context, x in points:  # after compiled ones, those that the interpreted functions decide
         exact: ExactValues = model.at(x, problem.p)
@@ -235,48 +245,28 @@ def check_problem(record: RunRecord, context: Context) -> str | None:
     return None
 
 
-def check_failed(record: RunRecord, context: Context) -> str | None:
-    """Check that a run without a point has no verdict."""
-    verdict = record.verdict
+def check_verdict(record: RunRecord, context: Context) -> str | None:
+    """Compare the verdict with what is evaluated at x; a run without a point has none."""
+    verdict, indexes = record.verdict, context.indexes
     judged = verdict.feasible or math.isfinite(verdict.objective) or verdict.indexes or verdict.dense
-    return "it has a verdict, but no point" if not record.x and (judged or verdict.guaranteed) else None
-
-
-def check_objective(record: RunRecord, context: Context) -> str | None:
-    """Compare the objective with that of x."""
-    stated, value = record.verdict.objective, context.objective
-    if value is None or is_same(stated, value):
+    if not record.x:
+        return "it has a verdict, but no point" if judged or verdict.guaranteed else None
+    if context.objective is None:
         return None
-    return f"its objective is {stated:.9g}, but that of its x is {value:.9g}"
-
-
-def check_violation(record: RunRecord, context: Context) -> str | None:
-    """Compare the violation with that of x."""
-    stated, value = record.verdict.violation, context.violation
-    if context.objective is None or is_same(stated, value, 1.0):
-        return None
-    return f"its violation is {stated:.3g}, but that of its x is {value:.3g}"
-
-
-def check_feasible(record: RunRecord, context: Context) -> str | None:
-    """Compare feasibility with the violation."""
-    verdict = record.verdict
-    if verdict.feasible == (verdict.violation <= FEASIBILITY_TOLERANCE):
-        return None
-    return (
-        f"it is called {'feasible' if verdict.feasible else 'infeasible'} with a violation of {verdict.violation:.3g}"
-    )
-
-
-def check_indexes(record: RunRecord, context: Context) -> str | None:
-    """Compare the indexes with those of x."""
-    stated, values = record.verdict.indexes, context.indexes
-    if not stated or values is None:
-        return None
-    if stated.keys() != values.keys():
-        return "its indexes have other names than those of the problem"
-    wrong = [name for name in values if not is_same(stated[name], values[name], 1.0)]
-    differences = (f"its index {n} is {stated[n]:.9g}, but that of its x is {values[n]:.9g}" for n in wrong)
+    pairs = {"objective": (verdict.objective, context.objective, 0.0)}
+    pairs["violation"] = verdict.violation, context.violation, 1.0
+    if indexes is not None and verdict.indexes:
+        if verdict.indexes.keys() != indexes.keys():
+            return "its indexes have other names than those of the problem"
+        pairs |= {f"index {name}": (verdict.indexes[name], value, 1.0) for name, value in indexes.items()}
+    differences = [
+        f"its {name} is {stated:.9g}, but that of its x is {value:.9g}"
+        for name, (stated, value, scale) in pairs.items()
+        if not is_same(stated, value, scale)
+    ]
+    if verdict.feasible != (verdict.violation <= FEASIBILITY_TOLERANCE):
+        word = "feasible" if verdict.feasible else "infeasible"
+        differences.append(f"it is called {word} with a violation of {verdict.violation:.3g}")
     return "; ".join(differences) or None
 
 
@@ -290,105 +280,30 @@ def check_bound(record: RunRecord, context: Context) -> str | None:
 
 
 def check_history(record: RunRecord, context: Context) -> str | None:
-    """Check that the best so far never worsens, belongs to the counts, and ends at the judged value."""
+    """Check that the history ends at the judged value, and at the number of evaluations that the run counts."""
     inputs, history, judged = record.inputs, record.history, record.verdict.objective
-    values = [value for value in history.objective if value is not None]
-    if any(not math.isfinite(value) for value in values):
-        return "its history has a value that is not finite"
     last = history.objective[-1] if history.objective else None
     tolerance = END_OF_SEARCH if inputs.is_search else END_OF_IMPORT if inputs.imported else END_OF_SOLVER
     if last is not None and not abs(last - judged) <= tolerance * max(abs(last), abs(judged)):
         return f"its history ends at {last:.9g}, but the judge finds {judged:.9g}"
-    counted = history.evaluations[-1] if history.evaluations else 0
+    counted, budget = history.evaluations[-1] if history.evaluations else 0, inputs.stop.get("evaluations")
     f = record.evaluations.get("f", counted)
     if not inputs.imported and (counted > f or (inputs.is_search and history.evaluations and counted != f)):
         return f"its history ends after {counted} evaluations, but it counts {f}"
-    return None
-
-
-def check_history_of_search(record: RunRecord, context: Context) -> str | None:
-    """Check that the best so far of a search never worsens, and has one entry for each generation at most."""
-    history, iterations = record.history, record.iterations
-    values = [value for value in history.objective if value is not None]
-    if not record.inputs.is_search:
-        return None
-    sign = record.inputs.objective.sign
-    if any(sign * (b - a) > 0.0 for a, b in itertools.pairwise(values)):
-        return "the best value of its history worsens"
-    if None in history.objective[len(history.objective) - len(values) :]:
-        return "its history loses a feasible point"
-    if record.claimed != bool(values):
-        return "its claim and its history disagree on whether a feasible point was found"
-    if any(a >= b for a, b in itertools.pairwise((0, *history.evaluations))):
-        return "its history has two entries at the same number of evaluations"
-    if len(history.evaluations) > iterations:
-        return f"its history has {len(history.evaluations)} entries, more than its {iterations} iterations"
-    return None
-
-
-def check_times(record: RunRecord, context: Context) -> str | None:
-    """Check that times ascend within the run."""
-    times = record.time_s
-    if any(a > b for a, b in itertools.pairwise((0.0, *times.history))):
-        return "the times of its history do not ascend from 0"
-    if any(value < 0.0 for value in (times.build, times.compile, times.solve, times.objective)):
-        return "it has a negative time"
-    if times.history and times.history[-1] > times.solve * (1.0 + SAME_VALUE):
-        return "its history is longer than its run"
-    return None
-
-
-def check_claims(record: RunRecord, context: Context) -> str | None:
-    """Compare claims with the judge, which a run derives from the same functions; imported claims are anything."""
-    claim, violation, verdict = record.claimed_objective, record.claimed_violation, record.verdict
-    if record.inputs.imported:
-        return None
-    if claim is not None and not is_same(claim, verdict.objective):
-        return f"it claims {claim:.9g}, but the judge finds {verdict.objective:.9g}"
-    if not record.inputs.is_search or violation is None:
-        return None
-    if not is_same(violation, verdict.violation, 1.0):
-        return f"it claims a violation of {violation:.3g}, but the judge finds {verdict.violation:.3g}"
-    if record.claimed != (violation == 0.0):
-        return "it claims a feasible point with a violation, or none without"
-    return None
-
-
-def check_counts(record: RunRecord, context: Context) -> str | None:
-    """Compare the counts of a run with each other and with its budget."""
-    inputs, budget = record.inputs, record.inputs.stop.get("evaluations")
-    if inputs.imported:
-        return None
-    f = record.evaluations["f"]
-    if max(record.failed_evaluations, record.iterations if inputs.is_search else 0) > f:
-        return f"it counts more failed evaluations or iterations than its {f} evaluations"
-    if not inputs.is_search or budget is None:
-        return None
-    if f > budget:
+    if inputs.is_search and budget is not None and f > budget:
         return f"it counts {f} evaluations, more than its budget of {budget}"
-    if (f == budget) != (BUDGET_USED in record.status.split("; ")):
-        return f"it counts {f} of {budget} evaluations, but ended by: {record.status}"
-    return None
-
-
-def check_copy(record: RunRecord, context: Context) -> str | None:
-    """Find a run that counts twice: with the seed, all times or the whole history of an earlier run of the same problem."""
-    first = context.first
-    for kind in ("times", "history"):
-        if (other := first.get(kind, record)) is not record:
-            return f"it is a copy of {other.solver}, run {other.run}, with all its times or its whole history"
-    if (other := first.get("seed", record)) is not record:
-        return f"its seed {record.seed} repeats that of run {other.run}"
     return None
 
 
 def check_settings(record: RunRecord, context: Context) -> str | None:
-    """Find a run whose settings are not those of the other runs of its name."""
+    """Find a run whose settings are not those of the other runs of its name, or whose seed is that of another one."""
     other, first = context.first.get("label", record), context.first.get("solver", record)
     if other.inputs.solver_key != record.inputs.solver_key:
         return f"its inputs are not those of run {other.run} of the same name; give the solvers different labels"
     if record.inputs.is_search and record.x and first.x and record.settings != first.settings:
         return f"its settings are not those of run {first.run}"
+    if (twin := context.first.get("seed", record)) is not record:
+        return f"its seed {record.seed} repeats that of run {twin.run}"
     return None
 
 
@@ -415,6 +330,8 @@ def check_between_samples(record: RunRecord, context: Context) -> str | None:
     words = ["nothing" if v.guaranteed is None else v.guaranteed.word for v in (stated, again)]
     if words[0] != words[1]:
         return f"guaranteed between the samples: recorded {words[0]}, found {words[1]}"
+    if [text.partition(" by ")[0] for text in stated.violated] != [t.partition(" by ")[0] for t in again.violated]:
+        return f"violated: recorded {', '.join(stated.violated) or 'nothing'}, found {', '.join(again.violated) or 'nothing'}"
     return None
 
 
@@ -424,20 +341,4 @@ def _are_same(a: Mapping[str, float] | None, b: Mapping[str, float] | None) -> b
     return a.keys() == b.keys() and all(is_same(a[name], b[name], 1.0) for name in a)
 
 
-CHECKS: tuple[Check, ...] = (
-    check_problem,
-    check_failed,
-    check_objective,
-    check_violation,
-    check_feasible,
-    check_indexes,
-    check_bound,
-    check_history,
-    check_history_of_search,
-    check_times,
-    check_claims,
-    check_counts,
-    check_copy,
-    check_settings,
-    check_code,
-)
+CHECKS: tuple[Check, ...] = (check_problem, check_verdict, check_bound, check_history, check_settings, check_code)
