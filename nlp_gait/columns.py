@@ -10,6 +10,7 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import is_numeric_text, read_text
 
 DELIMITERS = ",;\t"
+EXACT = 2.0**53  # the floats from here on are not all whole numbers
 MOST = 2**63 - 1  # a whole number in 64 bits, as other programs read it
 
 
@@ -80,5 +81,11 @@ def read_table(path: Path, what: str) -> CsvTable:
         for cell in row:
             if cell and not is_numeric_text(cell):
                 raise InputError(f"{owner}, line {number}: expected a number, got {cell[:40]!r}")
-        rows.append(tuple(float(cell) if cell else math.nan for cell in row))
+        rows.append(tuple(_parse_number(cell) if cell else math.nan for cell in row))
     return CsvTable(owner=owner, header=header, rows=tuple(rows), lines=tuple(number for number, _ in filled))
+
+
+def _parse_number(cell: str) -> float:
+    """Return a number; a whole one that a float would round stays whole, as seeds do."""
+    value = float(cell)
+    return int(cell) if abs(value) >= EXACT and cell.isdecimal() else value

@@ -33,6 +33,7 @@ COUNTER_BYTES = 8
 HIDDEN_WARNINGS = "ignore:resource_tracker"
 SPARE_DESCRIPTORS = 12  # that joblib needs beside one for each worker
 PR_SET_PDEATHSIG = 1
+QUESTION = b"?"  # first byte of a message of an isolated process that is no result
 VARIABLE = "PYTHONSAFEPATH"  # any text: Python searches no module in the working folder
 OWN_VALUE = "nlp-gait"
 
@@ -63,7 +64,7 @@ def keep_working_folder() -> Iterator[None]:
 
 def _fork(work: Callable[[Connection], None]) -> tuple[Connection, BaseProcess]:
     context = multiprocessing.get_context("fork")
-    results, sender = context.Pipe(duplex=False)
+    results, sender = context.Pipe()
 
     def begin() -> None:
         multiprocessing.current_process().daemon = False  # it may fork, too: a robot file is read in a child
@@ -153,21 +154,32 @@ def _collect(processes: dict[Connection, BaseProcess], check_stop: Callable[[], 
 
 
 def run_in_isolation(
-    call: Callable[[], bytes], time_limit_s: float | None, most_bytes: int, memory_bytes: int | None = None
+    call: Callable[..., bytes],
+    time_limit_s: float | None,
+    most_bytes: int,
+    memory_bytes: int | None = None,
+    answer: Callable[[bytes], bytes] | None = None,
 ) -> bytes:
     """Return what a call returns, at most so many bytes, in a forked process with its own session, without input and output.
 
     The call may hang, crash, exit or print. Its process and everything that it has started are killed at the end.
-    With ``memory_bytes``, it may take so much address space beyond what this process has (Linux only). Raises TimeoutError after
-    the time limit, and WorkerError, which says how, if the process ended without a result.
+    With ``memory_bytes``, it may take so much address space beyond what this process has (Linux only). With ``answer``, the call
+    receives a function by which it asks this process. Raises TimeoutError after the time limit, and WorkerError, which says how,
+    if the process ended without a result.
     """
-    results, process = _fork(lambda sender: _isolate(sender, call, memory_bytes))
+    results, process = _fork(lambda sender: _isolate(sender, call, memory_bytes, answer is not None))
+    latest = None if time_limit_s is None else time.monotonic() + time_limit_s
     try:
-        if not wait([results, process.sentinel], time_limit_s):
-            raise TimeoutError
-        data = b""
-        with suppress(EOFError, OSError):
-            data = results.recv_bytes(most_bytes) if results.poll(0) else b""
+        while True:
+            if not wait([results, process.sentinel], None if latest is None else max(0.0, latest - time.monotonic())):
+                raise TimeoutError
+            data = b""
+            with suppress(EOFError, OSError):
+                data = results.recv_bytes(most_bytes) if results.poll(0) else b""
+            if answer is None or data[:1] != QUESTION:
+                break
+            with suppress(BrokenPipeError):
+                results.send_bytes(answer(data[1:]))
         if not data:
             process.join(END_WITHIN_S)
             code = process.exitcode or 0
@@ -183,7 +195,11 @@ def run_in_isolation(
         results.close()
 
 
-def _isolate(sender: Connection, call: Callable[[], bytes], memory_bytes: int | None) -> None:
+def _isolate(sender: Connection, call: Callable[..., bytes], memory_bytes: int | None, may_ask: bool) -> None:
+    def ask(question: bytes) -> bytes:
+        sender.send_bytes(QUESTION + question)
+        return sender.recv_bytes()
+
     show_working_folder()
     os.setsid()
     if sys.platform == "linux":
@@ -201,7 +217,7 @@ def _isolate(sender: Connection, call: Callable[[], bytes], memory_bytes: int | 
         os.dup2(nowhere, descriptor)
     # New streams: a lock of the old ones may be held by a thread that does not exist here.
     sys.stdout = sys.stderr = open(nowhere, "w", encoding="utf-8", errors="replace", closefd=False)  # noqa: SIM115
-    sender.send_bytes(call())
+    sender.send_bytes(call(ask) if may_ask else call())
     sender.close()
     os._exit(0)  # without the exit handlers of the parent
 

@@ -14,7 +14,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors, make_folder, read_json
 
 MANIFEST = "manifest.json"
-MOST_FILES, LARGEST_FILE, LARGEST_TOTAL = 200_000, 64 * 2**20, 2 * 2**30  # [bytes]
+MOST_FILES, MOST_LEVELS, LARGEST_FILE, LARGEST_TOTAL = 10_000, 64, 64 * 2**20, 2**30  # sizes in bytes
 HIGHEST_RATIO = 200  # of the sizes of a file and of its compressed form, beyond the first megabyte
 
 
@@ -69,6 +69,7 @@ def _check_entries(owner: str, entries: list[zipfile.ZipInfo]) -> None:
         is_odd = not name.isprintable() or "\\" in name or ":" in name or place.is_absolute() or str(place) != name
         for is_wrong, reason in (
             (is_odd, "has a name that is not allowed"),
+            (len(place.parts) > MOST_LEVELS, f"is more than {MOST_LEVELS} folders deep"),
             (".." in place.parts or name.casefold() in seen, "is there twice, or outside of its folder"),
             (entry.is_dir() or kind not in (0, stat.S_IFREG), "is a folder or a link; only plain files are allowed"),
             (entry.flag_bits & 1, "is encrypted"),

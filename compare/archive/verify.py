@@ -3,6 +3,7 @@
 What can be computed is computed again and compared: every point, random runs, report and tables. Times stay as recorded.
 """
 
+import json
 import random
 import time
 from collections import defaultdict
@@ -24,7 +25,7 @@ from compare.study.settings import FILE, Manifest, read_manifest
 from compare.study.task import SOURCE, Handling, Inputs, ProblemSpec, Stop, Task
 from nlp_gait.backends.identity import FILES
 from nlp_gait.decoding import decode
-from nlp_gait.errors import GaitError, InputError
+from nlp_gait.errors import GaitError, InputError, UserCodeError
 from nlp_gait.files import make_temporary_folder, read_bytes
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.registry import resolve_stored
@@ -115,16 +116,18 @@ def verify_folder(
     for number, path in enumerate(sorted((folder / "certificates").glob("*.json"))):
         findings.append(_judge(f"certificates/{path.name}", partial(_check_certificate, path, number)))
     rewritten = _judge("texts", lambda: _check_texts(folder, records, manifest, evidence))
-    repeated = list(_repeat_runs(records, share, places, progress))
-    scope = _describe_scope(folder, records, manifest, sum(f.holds is not None for f in repeated))
-    return Verification([*findings, rewritten, *repeated], records, scope)
+    repeated = _repeat_runs(records, share, places, progress)
+    scope = _describe_scope(folder, records, sum(f.holds is not None for f in repeated))
+    wrong = [finding for finding in repeated if not finding.holds]
+    same = [Finding("repeated runs", True, f"{len(repeated) - len(wrong)} have the same results, to the last bit")]
+    return Verification([*findings, rewritten, *wrong, *(same if len(wrong) < len(repeated) else [])], records, scope)
 
 
 def _judge(what: str, check: Callable[[], str]) -> Finding:
     """Return the finding of a check, which returns what holds, and raises what does not."""
     try:
         return Finding(what, True, check())
-    except NotCheckedError as error:
+    except (NotCheckedError, UserCodeError) as error:
         return Finding(what, None, str(error))
     except GaitError as error:
         return Finding(what, False, str(error))
@@ -269,7 +272,7 @@ def _check_texts(folder: Path, records: Sequence[RunRecord], manifest: Manifest,
     return f"{_list_some([path.name for path in written])} follow from the records"
 
 
-def _describe_scope(folder: Path, records: Sequence[RunRecord], manifest: Manifest, repeated: int) -> tuple[str, str]:
+def _describe_scope(folder: Path, records: Sequence[RunRecord], repeated: int) -> tuple[str, str]:
     """Return a line about what was evaluated and repeated, and one about what was not checked."""
     listed = {name_run(record) for record in records}
     others = sum(path.relative_to(folder / RECORDS).with_suffix("").as_posix() not in listed
@@ -305,38 +308,28 @@ def _choose_runs(records: Sequence[RunRecord], share: float | None) -> tuple[lis
 
 def _repeat_runs(
     records: Sequence[RunRecord], share: float | None, places: Mapping[str, str], progress: Progress
-) -> Iterator[Finding]:
+) -> list[Finding]:
     chosen, needed = _choose_runs(records, share)
 
     def repeat(record: RunRecord) -> Finding:
-        call = partial(_repeat_run, record, _move_files(record, places))
-        return _judge(f"repeated: {name_record(record)}", call)
+        progress(name_record(record))
+        return _judge(f"repeated: {name_record(record)}", lambda: _repeat_run(record, _move_files(record, places)))
 
-    began, findings = time.monotonic(), list[Finding]()
+    began = time.monotonic()
     for record in chosen[:needed]:  # built before the forks
         load_problem(_move_files(record, places))
-    for finding in map_in_forks(repeat, chosen[:needed]):
-        progress(finding.what)
-        findings.append(finding)
-    for finding in map_in_forks(repeat, chosen[needed:], lambda: time.monotonic() - began > FURTHER_S):
-        progress(finding.what)
-        findings.append(finding)
-    wrong = [finding for finding in findings if not finding.holds]
-    same = len(findings) - len(wrong)
-    if same:
-        yield from wrong
-        yield Finding("repeated runs", True, f"{same}, to the last bit")
-    else:
-        yield from wrong
+    first = list(map_in_forks(repeat, chosen[:needed]))
+    return [*first, *map_in_forks(repeat, chosen[needed:], lambda: time.monotonic() - began > FURTHER_S)]
 
 
 def _repeat_run(record: RunRecord, moved: RunRecord) -> str:
     """Repeat a run, whose files may have moved: the same seed gives the same bits."""
     again = try_task(_make_task(record, moved.inputs))
+    recorded, found = record.to_json(), again.to_json()
     for what in REPEATED:
-        before, now = getattr(record, what), getattr(again, what)
-        if before != now and repr(before) != repr(now):  # NaN differs from itself
-            text = f"its {what.replace('_', ' ')} differs: recorded {before!r:.100}, found {now!r:.100}"
+        before, now = (json.dumps(plain[what], sort_keys=True) for plain in (recorded, found))
+        if before != now:
+            text = f"its {what.replace('_', ' ')} differs: recorded {before:.100}, found {now:.100}"
             if record.inputs.code != again.inputs.code:
                 raise NotCheckedError(f"{text}; other code is installed here")
             raise InputError(text)
@@ -348,15 +341,13 @@ def _make_task(record: RunRecord, inputs: Inputs) -> Task:
 
     Raises:
         NotCheckedError: the run ended by the clock, its solver was an object in Python, or it needs other code than here.
+        UserCodeError: it needs user code that the command does not name.
     """
     solver, stored = inputs.solver, decode(StoredProblem, inputs.problem, "problem")
     if not isinstance(solver, str):
         if "name" not in solver:
             raise NotCheckedError("its solver was an object of Python, which has no name")
-        try:
-            solver = resolve_code(solver["name"], "algorithm", "the run")
-        except GaitError as error:
-            raise NotCheckedError(str(error)) from error
+        solver = resolve_code(solver["name"], "algorithm", "the run")
     if inputs.stop.get("time_limit_s") is not None:
         raise NotCheckedError("it ended by the clock or could have")
     name, options = resolve_stored(stored.name, stored.options, "the run")

@@ -20,7 +20,7 @@ from typing import Annotated, Any
 import typer
 
 from compare.cli.printing import Output, fail, print_output, say_error
-from nlp_gait.errors import GaitError
+from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import check_output, protect_inputs
 from nlp_gait.interrupts import raise_interrupts
 
@@ -38,6 +38,7 @@ WRITTEN_CONTENT = {
     ".gif": rb"\AGIF89a.*nlp-gait",
     ".png": rb"\A\x89PNG.*Matplotlib",
 }
+LARGEST_NUMBER = 1e9  # of an option
 SESSION = "session"  # of one that decides how and where a study runs, not what it computes
 CONTINUE = "rerun the command to continue"
 
@@ -68,6 +69,7 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
         as_json = given.pop("as_json")
         try:
             with raise_interrupts():
+                _check_numbers(given)
                 protect_inputs(_find_inputs(given, outputs), given.pop("force", False))
                 for name in files:
                     if given[name] is not None:
@@ -99,6 +101,14 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
     return run
+
+
+def _check_numbers(given: Mapping[str, Any]) -> None:
+    """Raise InputError for an option that is NaN or infinite, or beyond any use."""
+    for name, value in given.items():
+        if isinstance(value, float) and not abs(value) <= LARGEST_NUMBER:  # NaN fails too
+            option = f"--{name.replace('_', '-')}"
+            raise InputError(f"{option} must be a finite number within +-{LARGEST_NUMBER:g}, got {value}")
 
 
 def check_output_file(path: Path) -> Path:

@@ -21,6 +21,7 @@ from nlp_gait.formulation import Array, GaitProblem
 # Table next to the variables.
 FINALS = ("run", "seed", "objective", "violation", "evaluations", "time_s")
 HISTORY = ("run", "evaluations", "objective")
+MOST_POINTS = 100_000
 # Least values of those that are numbers, not counts.
 LEAST = {"objective": -math.inf, "violation": 0.0, "time_s": 0.0}
 
@@ -43,7 +44,11 @@ def read_points(path: Path, problem: GaitProblem, others: Sequence[str] = ()) ->
             f"{table.owner} has {table.width} columns and no header; {problem.name} has {len(problem.names)} variables: "
             f"{', '.join(problem.names)}"
         )
-    points = np.array(table.rows)[:, order]
+    if len(table.rows) > MOST_POINTS:
+        raise InputError(
+            f"{table.owner} has {len(table.rows)} rows; at most {MOST_POINTS} are read at once: split the file"
+        )
+    points = np.array(table.rows, dtype=float)[:, order]
     for line, x in zip(table.lines, points, strict=True):
         if not np.isfinite(x).all():
             name = problem.names[int(np.flatnonzero(~np.isfinite(x))[0])]

@@ -230,6 +230,9 @@ def parse_record(raw: Any) -> RunRecord:
         raise ValueError(f"evaluations must be counts of {', '.join(sorted(CALLS))}, among them f")
     if verdict.feasible and not math.isfinite(verdict.objective):
         raise ValueError("a feasible verdict without an objective")
+    proof = verdict.guaranteed
+    if proof is not None and not (proof.satisfied or proof.violations or proof.reason):
+        raise ValueError("a guarantee is missing without a violation or a reason")
     return record
 
 

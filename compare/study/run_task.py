@@ -4,21 +4,27 @@ import json
 import math
 import multiprocessing
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from compare.judge import evaluate
+from compare.study.origin import format_now
 from compare.study.record import History, RunRecord, Times, Verdict, check_readable, parse_record
 from compare.study.task import IPOPT, Task, describe_settings
-from metaheuristics.minimize import minimize
+from metaheuristics.external_program import ExternalProgram
+from metaheuristics.interface import BatchObjective
+from metaheuristics.interface import History as SearchHistory
+from metaheuristics.minimize import Evaluator, minimize
 from metaheuristics.registry import make_handling
+from metaheuristics.user_algorithm import PlainFunction
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.backends.solve import make_solution
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import LARGEST_FILE, check_plain
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Best
 from nlp_gait.processes import keep_working_folder, run_in_isolation
 
@@ -27,6 +33,7 @@ Run = Callable[[Task], RunRecord]
 
 MOST_REASON = 500  # characters of an error in a record
 MOST_HISTORY = 10_000  # entries of a history in a record, some 60 bytes each
+_ask: Callable[[bytes], bytes] | None = None  # in an isolated process: asks its parent for values
 # A run that respects its time limit ends within it and is then judged; its process is killed this long after the limit.
 GRACE_S = 5.0
 # Number of runs of one solver for which compiling is weighed. The same number in every study: compiled and interpreted functions
@@ -48,7 +55,8 @@ def run_task(task: Task, callback: Callable[..., None] | None = None) -> RunReco
 def try_task(task: Task, run: Run = run_task) -> RunRecord:
     """Perform one run; whatever fails in it becomes its record instead of ending the study.
 
-    User code runs in its own process, which is killed if it does not return; IPOPT polishes its result in this one.
+    User code runs in its own process, which is killed if it does not return; this one evaluates what it proposes, counts and
+    judges. IPOPT polishes its result in this one.
     """
     if not task.is_user_code:
         return _run_caught(task, run)
@@ -88,15 +96,18 @@ def _run_isolated(task: Task, run: Run) -> RunRecord:
     if "fork" not in multiprocessing.get_all_start_methods() or multiprocessing.current_process().daemon:
         return _run_caught(task, run)
     problem = task.problem.load()
-    compile_objective(problem, threads=1)
-    evaluate(problem, 0.5 * (problem.lower + problem.upper))
+    counter = _Counter(problem, task.stop.evaluations)
 
-    def call() -> bytes:
+    def call(ask: Callable[[bytes], bytes]) -> bytes:
+        global _ask
+        _ask = ask
         return json.dumps(_run_caught(task, run).to_json(), allow_nan=False).encode()
 
     limit = task.stop.time_limit_s
     try:
-        data = json.loads(run_in_isolation(call, None if limit is None else limit + GRACE_S, LARGEST_FILE))
+        data = json.loads(
+            run_in_isolation(call, None if limit is None else limit + GRACE_S, LARGEST_FILE, answer=counter)
+        )
         check_plain(data)
         record = parse_record(data)
     except TimeoutError:
@@ -112,56 +123,131 @@ def _run_isolated(task: Task, run: Run) -> RunRecord:
         task.inputs().key,
     ):
         return RunRecord.make_failed(task, "its process sent the record of another run")
-    return record
+    return record if not record.x else counter.judge(task, record)
+
+
+class _Counter:
+    """Evaluates, counts and judges what an isolated process proposes, by functions that its code cannot reach."""
+
+    def __init__(self, problem: GaitProblem, budget: int) -> None:
+        self._problem, self._budget = problem, budget
+        self._objective = compile_objective(problem, threads=1)
+        self._record: Evaluator | None = None  # its clock starts with the first point
+
+    def __call__(self, question: bytes) -> bytes:
+        """Return objectives and violations of points (P, n) as bytes; raises WorkerError for anything else, or too many."""
+        lower, upper = self._problem.lower, self._problem.upper
+        thinned, data = question[:1] == b"1", question[1:]
+        if not data or len(data) % lower.nbytes:
+            raise WorkerError("its process sent something other than points")
+        X = np.frombuffer(data).reshape(-1, len(lower))
+        if not ((lower <= X) & (upper >= X)).all():  # NaN fails too
+            raise WorkerError("its process sent points outside of the bounds")
+        record = self._record = self._record or Evaluator(self._objective, None, thinned)
+        if record.evaluations + len(X) > self._budget:
+            raise WorkerError(f"its process asked for more than its budget of {self._budget} evaluations")
+        return b"".join(values.tobytes() for values in record(X))
+
+    def judge(self, task: Task, claim: RunRecord) -> RunRecord:
+        """Return the record of a run, with the point, counts and history that were evaluated here, whatever it claims."""
+        record = self._record
+        if record is None:
+            return RunRecord.make_failed(task, "its process sent a result, but no point to evaluate")
+        history, counts = record.history(), (record.evaluations, record.failed, record.generations)
+        times = replace(claim.time_s, solve=record.elapsed_s, objective=record.objective_time_s)
+        own = replace(RunRecord.make_failed(task, ""), settings=claim.settings, status=claim.status, time_s=times)
+        listed = {*claim.history.evaluations, record.evaluations}
+        return _judge_search(own, self._problem, record.best_x, record.best, counts, history, listed)
 
 
 def _search(task: Task, callback: Callable[..., None] | None) -> RunRecord:
     started = time.perf_counter()
     problem = task.problem.load()
     built = time.perf_counter()
-    objective = compile_objective(problem, threads=1)  # runs take the processors
+    objective: BatchObjective = compile_objective(problem, threads=1)  # runs take the processors
     compiled = time.perf_counter()
-    sign, stop = problem.objective.sign, task.stop
+    stop = task.stop
     with keep_working_folder():  # as wrappers of external programs change it
+        algorithm = task.make_search()
+        if _ask is not None:
+            objective = _RemoteObjective(objective, _ask, isinstance(algorithm, (PlainFunction, ExternalProgram)))
         result = minimize(
             objective,
-            task.make_search(),
+            algorithm,
             evaluations=stop.evaluations,
             seed=task.run_seed,
             handling=make_handling(task.handling.name, **task.handling.settings),
-            stop=stop.end_early(sign),
+            stop=stop.end_early(problem.objective.sign),
             callback=callback,
         )
-    history = result.history
-    best = [
+    times = Times(
+        build=built - started,
+        compile=compiled - built,
+        solve=result.time_s,
+        objective=result.objective_time_s,
+        history=(),
+    )
+    settings = {**describe_settings(result.algorithm), "handling": describe_settings(result.handling)}
+    record = replace(RunRecord.make_failed(task, ""), settings=settings, status="; ".join(result.reasons), time_s=times)
+    counts = result.evaluations, result.failed_evaluations, result.generations
+    return _judge_search(record, problem, result.x, (result.violation, result.objective), counts, result.history)
+
+
+def _judge_search(
+    record: RunRecord,
+    problem: GaitProblem,
+    x: Array,
+    best: tuple[float, float],
+    counts: tuple[int, int, int],
+    history: SearchHistory,
+    listed: Collection[int] | None = None,
+) -> RunRecord:
+    """Return a search's record with its best point, which is judged, and its history.
+
+    Args:
+        record: of the run, with settings, status and times.
+        problem: that was solved.
+        x: (n,) best point.
+        best: its violation and objective, which is minimised.
+        counts: evaluations, failed ones, generations.
+        history: all entries.
+        listed: numbers of evaluations whose entries are kept; None chooses them.
+    """
+    sign, (violation, objective) = problem.objective.sign, best
+    course = [
         sign * float(f) if v == 0.0 and math.isfinite(f) else None
         for f, v in zip(history.objective, history.violation, strict=True)
     ]
-    kept = _choose_entries(best)
-    return RunRecord.from_task(
-        task,
-        settings={**describe_settings(result.algorithm), "handling": describe_settings(result.handling)},
-        status="; ".join(result.reasons),
-        claimed=result.feasible,
-        x=problem.by_name(result.x),
-        claimed_objective=sign * result.objective if math.isfinite(result.objective) else None,
-        claimed_violation=result.violation if math.isfinite(result.violation) else None,
-        verdict=Verdict.from_evaluation(evaluate(problem, result.x)),
-        evaluations={"f": result.evaluations},
-        failed_evaluations=result.failed_evaluations,
-        iterations=result.generations,
-        active_constraints=(),
+    kept = _choose_entries(course)
+    if listed is not None:
+        kept = [k for k in range(len(course)) if int(history.evaluations[k]) in listed]
+    return replace(
+        record,
+        claimed=violation == 0.0,
+        x=problem.by_name(x),
+        claimed_objective=sign * objective if math.isfinite(objective) else None,
+        claimed_violation=violation if math.isfinite(violation) else None,
+        verdict=Verdict.from_evaluation(evaluate(problem, x)),
+        evaluations={"f": counts[0]},
+        failed_evaluations=counts[1],
+        iterations=counts[2],
         history=History(
-            evaluations=tuple(int(history.evaluations[k]) for k in kept), objective=tuple(best[k] for k in kept)
+            evaluations=tuple(int(history.evaluations[k]) for k in kept), objective=tuple(course[k] for k in kept)
         ),
-        time_s=Times(
-            build=built - started,
-            compile=compiled - built,
-            solve=result.time_s,
-            objective=result.objective_time_s,
-            history=tuple(float(history.elapsed_s[k]) for k in kept),
-        ),
+        time_s=replace(record.time_s, history=tuple(float(history.elapsed_s[k]) for k in kept), finished=format_now()),
     )
+
+
+class _RemoteObjective:
+    """The objective in an isolated process, which asks its parent for every value."""
+
+    def __init__(self, bounded: BatchObjective, ask: Callable[[bytes], bytes], thinned: bool) -> None:
+        self.names, self.lower, self.upper = bounded.names, bounded.lower, bounded.upper
+        self._ask, self._kind = ask, b"1" if thinned else b"0"
+
+    def __call__(self, X: Array) -> tuple[Array, Array]:
+        f, violation = np.frombuffer(self._ask(self._kind + X.tobytes())).reshape(2, -1)
+        return f.copy(), violation.copy()
 
 
 def _choose_entries(best: Sequence[float | None]) -> list[int]:

@@ -77,7 +77,7 @@ def _write_numbers(linkage: str, name: str, values: Array) -> str:
 def _format_words(problem: GaitProblem, model: NlpModel, nlp_plan: NlpPlan, prefix: str) -> Mapping[str, str]:
     m, n = nlp_plan.jacobian.shape
     return {
-        "WHAT": f"{problem.address}: {problem.title}",
+        "WHAT": f"{problem.address}: {problem.title}".replace("*/", "* /"),
         "N": str(n),
         "M": str(m),
         "K": str(nlp_plan.parameters),

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
-from nlp_gait.files import protect_input, read_bytes
+from nlp_gait.files import protect_input
 from nlp_gait.robots.limits import read_in_child
-from nlp_gait.robots.meshes import list_shape_points, move_points
+from nlp_gait.robots.meshes import list_shape_points, move_points, read_model
 from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
@@ -100,7 +100,7 @@ def _compile(path: str) -> Any:
         raise MissingExtraError(
             f"robot file {path!r}: MJCF files need MuJoCo, which is not installed: pip install 'nlp-gait[sim]'"
         )
-    read_bytes(Path(path), "robot file", error=RobotDataError)  # refuses special files
+    read_model(path)  # refuses special files
     mujoco = import_module("mujoco")  # before the fork, which would import it in vain
     texts, _, data = read_in_child(f"robot file {path!r}", partial(_compile_binary, mujoco, path)).partition(b"\n")
     warnings, files = json.loads(texts)

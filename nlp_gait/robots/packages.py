@@ -30,6 +30,8 @@ def find_robot_file(name: str) -> str:
     if name.endswith((".json", *MODEL_ENDINGS)) or MARK not in name:
         return name
     package, _, robot = name.partition(MARK)
+    if not (package and robot):
+        raise RobotDataError(f"robot {name!r}: PACKAGE:NAME needs both names")
     package, robot = SHORT_NAMES.get(package, package), robot.removesuffix(DESCRIPTION)
     try:
         robots = FINDERS.get(package, _list_files)(package)

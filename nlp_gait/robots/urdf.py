@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
-from nlp_gait.files import protect_input, read_bytes
+from nlp_gait.files import protect_input
 from nlp_gait.robots.meshes import (
     find_mesh,
     list_shape_points,
@@ -18,6 +18,7 @@ from nlp_gait.robots.meshes import (
     move_points,
     parse_xml,
     read_mesh_points,
+    read_model,
 )
 from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, compute_point_inertia, to_vector
@@ -138,7 +139,7 @@ def _read_xml(path: str) -> Any:
         raise MissingExtraError(
             f"robot file {path!r}: URDF files need the package lxml, which is not installed: pip install 'nlp-gait[urdf]'"
         )
-    data = read_bytes(Path(path), "robot file", error=RobotDataError)
+    data = read_model(path)
     try:
         robot = parse_xml(data)
     except ValueError as error:
