@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from compare.archive.unpack import MANIFEST, unpack_archive
 from compare.report import FurtherFiles, write_report
-from compare.study.evidence import CheckedRecords, map_in_forks, name_record, read_evidence
+from compare.study.evidence import CheckedRecords, compute_in_forks, name_record, read_evidence
 from compare.study.origin import hash_installed_code
 from compare.study.record import RunRecord, load_problem
 from compare.study.record_files import RECORDS, name_run
@@ -318,8 +318,8 @@ def _repeat_runs(
     began = time.monotonic()
     for record in chosen[:needed]:  # built before the forks
         load_problem(_move_files(record, places))
-    first = list(map_in_forks(repeat, chosen[:needed]))
-    return [*first, *map_in_forks(repeat, chosen[needed:], lambda: time.monotonic() - began > FURTHER_S)]
+    first = list(compute_in_forks(repeat, chosen[:needed]))
+    return [*first, *compute_in_forks(repeat, chosen[needed:], lambda: time.monotonic() - began > FURTHER_S)]
 
 
 def _repeat_run(record: RunRecord, moved: RunRecord) -> str:

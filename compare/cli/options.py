@@ -150,7 +150,7 @@ def parse_numbers(name: str, text: str, flag: str, *, least: float = -LARGEST, m
 
 
 def parse_number(name: str, text: str, flag: str, *, least: float = -LARGEST, most: float = LARGEST) -> float:
-    """Return a finite number within its limits; InputError if the text is none."""
+    """Return a finite number within its limits; InputError if the text is not one."""
     try:
         value = float(text)
     except ValueError:

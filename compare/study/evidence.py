@@ -105,7 +105,7 @@ def check_records(
     pairs = list(zip(records, contexts, strict=True))
     reasons = [[reason for check in CHECKS if (reason := check(*pair))] for pair in pairs]
     chosen = list(_choose_runs(pairs, reasons, between_samples))
-    for k, reason in zip(chosen, map_in_forks(lambda k: check_between_samples(*pairs[k]), chosen), strict=True):
+    for k, reason in zip(chosen, compute_in_forks(lambda k: check_between_samples(*pairs[k]), chosen), strict=True):
         reasons[k] += [reason] if reason else []
     excluded = [
         Exclusion(name_record(r), tuple(why), r, context.needs_code)
@@ -147,7 +147,7 @@ def group_by(records: Sequence[RunRecord], key: Callable[[RunRecord], object]) -
     return list(groups.values())
 
 
-def map_in_forks(call: Callable[[T], R], items: Sequence[T], stop: Callable[[], bool] = never) -> Iterator[R]:
+def compute_in_forks(call: Callable[[T], R], items: Sequence[T], stop: Callable[[], bool] = never) -> Iterator[R]:
     """Yield call(item) of each item in order, in forks where they pay; after ``stop`` returns True, no further one is begun."""
     workers = min(count_workers(), len(items) // 2)
     if workers > 1:
