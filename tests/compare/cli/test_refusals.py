@@ -17,9 +17,9 @@ PARETO = "pareto nao-ssp --set intervals=4 --points 5 --out {new}"
 REFUSED = {
     "evaluate nao-spp --x 1": "unknown problem 'nao-spp'|nao-ssp",
     "evaluate nao-ssp --x 0.31,2": "must have 9 values",
-    f"evaluate nao-ssp --x nan{POINT[4:]}": "hip_height_m must be finite|nan",
-    f"evaluate nao-ssp --x {POINT[:-1]}inf": "single_support_time_s must be finite|inf",
-    "evaluate nao-ssp --x a,b": "must be a number|'a'",
+    f"evaluate nao-ssp --x nan{POINT[4:]}": "x must be a finite number|nan",
+    f"evaluate nao-ssp --x {POINT[:-1]}inf": "x must be a finite number|inf",
+    "evaluate nao-ssp --x a,b": "must be a finite number|'a'",
     "solve nao-ssp --set swing_hight_m=0.02": "unknown parameter|swing_height_m",
     "solve nao-ssp --set torque_change_limit=0.02": "unknown parameter|torque_change_limit_Nm",
     "solve nao-ssp --robot nao-v7": "unknown robot 'nao-v7'|nao-v",
