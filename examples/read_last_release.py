@@ -23,6 +23,7 @@ def convert(old: dict[str, Any]) -> RunRecord:
     """Return the record; raises ValueError for anything else, and GaitError if its problem is gone."""
     inputs, origin = old.pop("definition"), old["origin"]
     problem = inputs["problem"]
+    problem["options"].pop("load_degree", None)  # acted on planned loads alone, which are gone
     spec = ProblemSpec(name=problem["name"], options=problem["options"], values=problem["parameters"])
     inputs["problem"] = identify_problem(spec.load())
     inputs["code"] = origin.pop("code_sha256") if origin else ""

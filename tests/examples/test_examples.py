@@ -116,14 +116,16 @@ def test_the_study_file_can_run() -> None:
 
 
 def test_records_of_the_last_release_are_converted() -> None:
-    """A run, and one that polishes a search."""
+    """A run, one that polishes a search, and one of a problem that has lost an option."""
     convert = runpy.run_path(str(ROOT / "examples" / "read_last_release.py"))["convert"]
-    walk, search = ProblemSpec(name="walk12"), {"handling": {"name": "deb", "settings": {}}}
-    for polish in (False, True):
-        task = Task(problem=walk, solver="random", stop=Stop(evaluations=60), polish=polish)
+    search = {"handling": {"name": "deb", "settings": {}}}
+    for name, polish in (("walk12", False), ("walk12", True), ("nao-dsp", False)):
+        task = Task(problem=ProblemSpec(name=name), solver="random", stop=Stop(evaluations=60), polish=polish)
         raw = run_task(task).to_json()
         inputs, origin = raw.pop("inputs"), raw["origin"]
         old = {key: inputs[key] for key in ("problem", "objective", "settings", "seed")}
+        if name == "nao-dsp":
+            old["problem"]["options"]["load_degree"] = 4
         stop = {"evaluations": 60, "target": None, "stagnation": None, "time_limit_s": None}
         old |= {"solver": "ipopt", "polishes": {"solver": "random", "stop": stop, **search}} if polish else search
         old |= {} if polish else {"solver": "random", "stop": stop}
