@@ -118,6 +118,8 @@ class Drive:
         """Return what corrects the set-points of one simulation, None in open loop; ``model`` is the nominal one."""
         if self.controller is not None and self.controller.gravity_compensation > 0.0:
             return GravityCompensation(self.controller, plan, model)
+        if self.feedback is None and self.balance is None:
+            return None
         joints = [plan.robot.joint(name) for name in plan.joints]
         stiffness, damping, limits = (
             np.array([find(joint) for joint in joints]) for find in (self.stiffness, self.damping, self.torque_limit)

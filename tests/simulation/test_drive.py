@@ -71,7 +71,7 @@ def test_a_drive_is_as_stiff_as_its_motor_is_strong_and_its_limit_is_the_request
     assert all(Drive(torque_limits=name).torque_limit(bare) == joint.torque_limit_Nm for name in limits)
     assert Drive().stiffness(joint) == stall / 0.08 and Drive().stiffness(bare) == joint.torque_limit_Nm / 0.08
     assert Drive().damping(joint) == Drive().stiffness(joint) * 0.02
-    assert Drive().balance(None, None) is None
+    assert Drive().make_corrector(None, None) is None
 
 
 @pytest.mark.parametrize("name", ["full_error_rad", "time_constant_s", "period_s"])

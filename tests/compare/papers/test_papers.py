@@ -3,28 +3,47 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.papers.paper_runs import Runner
 from compare.papers.rules import Ruling
+from compare.papers.walk12.walk12 import LITERAL, RAISED, READINGS, SECOND, TABLE_3
+from compare.study.record import read_record
 from docs.pages.papers import RECORDS, paper_page
 from nlp_gait.errors import OutputError
+
+Quick = Callable[[str], tuple[Path, dict[str, Any]]]
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory: pytest.TempPathFactory) -> Quick:
+    """Return folder and record of a paper's quick reproduction, which is run once."""
+
+    @cache
+    def reproduce(name: str) -> tuple[Path, dict[str, Any]]:
+        folder, paper = tmp_path_factory.mktemp(name), load_reproduction(name)
+        return folder, paper.reproduce(Runner(folder=folder, jobs=1), paper.quick)
+
+    return reproduce
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", REPRODUCTIONS)
-def test_a_quick_run_confirms_the_record(name: str, tmp_path: Path) -> None:
+def test_a_quick_run_confirms_the_record(name: str, quick: Quick) -> None:
     paper = load_reproduction(name)
     recorded = json.loads((RECORDS / f"{name}.json").read_text(encoding="utf-8"))["verdicts"]
-    quick = paper.reproduce(Runner(folder=tmp_path, jobs=1), paper.quick)["verdicts"]
-    assert quick.keys() == recorded.keys() == paper.book.claims.keys()
-    for id, row in quick.items():
+    folder, fresh = quick(name)
+    assert fresh["verdicts"].keys() == recorded.keys() == paper.book.claims.keys()
+    for id, row in fresh["verdicts"].items():
         words = {*row.values()} if id in paper.book.on_runs else row
         assert words == ({Ruling.NOT_RUN} if id in paper.book.on_runs else recorded[id]), id
-    report = (tmp_path / "report.md").read_text(encoding="utf-8")
+    report = (folder / "report.md").read_text(encoding="utf-8")
     assert (
         report.index("holds in") < report.index("## Claims decided by computation") < report.index("## What is not as")
     )
@@ -51,3 +70,23 @@ def test_a_folder_that_cannot_be_written_to_fails_before_the_work(name: str, tmp
     paper = load_reproduction(name)
     with pytest.raises(OutputError):
         paper.reproduce(Runner(folder=tmp_path / "file"), paper.quick)
+
+
+@pytest.mark.slow
+def test_claims_of_the_12_joint_walk_hold_in_some_readings_only(quick: Quick) -> None:
+    verdicts = quick("walk12")[1]["verdicts"]
+    assert verdicts["f1-last"] == {name: "holds" if name == RAISED else "does not hold" for name in READINGS}
+    assert verdicts["f1-over-time"] == {name: "holds" if name == SECOND else "does not hold" for name in READINGS}
+    assert verdicts["time-steps"][LITERAL] == "holds"
+
+
+@pytest.mark.slow
+def test_tables_of_the_12_joint_walk_agree_with_the_records(quick: Quick) -> None:
+    folder, record = quick("walk12")
+    records = folder / "records"
+    starts = [read_record(path) for path in (records / "as-printed-1").glob("ipopt-*.json")]
+    assert len(starts) == load_reproduction("walk12").quick.starts
+    (table,) = [part for part in record["parts"] if part.get("caption", "").startswith("Table III")]
+    shown = dict(zip(table["columns"], table["rows"][-1], strict=True))
+    assert float(shown["IPOPT: f"]) == pytest.approx(max(run.verdict.objective for run in starts), rel=5e-4)
+    assert float(shown["paper: f"]) == TABLE_3[-1].f
