@@ -7,7 +7,7 @@ import inspect
 import json
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal, get_args, get_origin, get_type_hints
 
@@ -26,7 +26,7 @@ from nlp_gait.symbolic.nonsmooth import Exact
 
 GAITS = "gaits"  # folder at the root of the site, see ``front``
 LEFT_OUT = ("gaitbench",)  # a suite, with a page of its own
-SHOWN = 24  # variables, and binding rows, on a page
+SHOWN = 12  # variables, and binding rows, on a page
 SAME = 1e-6  # relative; another processor rounds otherwise
 OPTION = re.compile(r"^ {4}(\w+) {2,}(.+(?:\n {8,}.+)*)", re.MULTILINE)
 ARGUMENT = re.compile(r"^ {4}(\w+): (.+(?:\n {8,}.+)*)", re.MULTILINE)
@@ -73,6 +73,7 @@ def write(folder: Path) -> None:
     pages["index.md"] = page(
         INTRODUCTION,
         table(header, rows),
+        list_options(list(problems.values())),
         SIZES_INTRODUCTION,
         nlp_sizes(),
         INSTANCES,
@@ -190,7 +191,7 @@ def _picture(problem: GaitProblem, best: Best | None, folder: Path) -> str:
     if best is None or problem.display.motion is None:
         return ""
     plot_gait(problem, best.x, problem.name).savefig(folder / f"{problem.name}.png", dpi=150)
-    words = f"![{PICTURE}]({problem.name}.png)\n\n*{PICTURE}*"
+    words = f"![{PICTURE}]({problem.name}.png)"
     return words if problem.display.skeleton is None else f"{words}\n\n{frame_gait(problem.name)}"
 
 
@@ -222,7 +223,6 @@ def best_section(problem: GaitProblem, found: Difficulty | None) -> str:
         )
     text = [
         f"**{with_unit(best.objective, objective.unit, '.8g')}**, to {objective.sense}; found by {best.solver}.",
-        *(f"{_share(r)} runs of {solver} end within 0.1 % of it." for solver, r in found.solvers.items()),
     ]
     for definition in DEFINITIONS:
         same = definition.problem == problem.name and not definition.values and not definition.held
@@ -276,11 +276,7 @@ def _rows(problem: GaitProblem) -> str:
         for name, group in groups.items()
     ]
     sides = sum((row.lower is not None) + (row.upper is not None) for row in values)
-    words = (
-        f"{len(values)} constraints in {len(groups)} groups, and the bounds of the variables. Each is one value between a lower "
-        f"and an upper bound; written as one-sided inequalities, as GaitBench does, they are {sides}. Times of instants are the "
-        "problem's samples."
-    )
+    words = f"{len(values)} constraints in {len(groups)} groups; as one-sided inequalities they are {sides}."
     header = ("group", "constraints", "unit", "lower", "upper", "of each")
     return page("## Constraints", words, table(header, rows)).strip()
 
@@ -296,21 +292,35 @@ def _range(bounds: list[float | None]) -> str:
 def _parameters(problem: GaitProblem) -> str:
     if not problem.own_parameters:
         return ""
-    rows = [(code(q.name), f"{q.default:g}", literal(q.unit), literal(q.description)) for q in problem.own_parameters]
-    words = "Changed by `--set NAME=VALUE` without rebuilding anything, as are the bounds: `--set NAME.upper=VALUE`."
-    return page("## Parameters", words, table(("parameter", "default", "unit", "what"), rows)).strip()
+    limits = [q for q in problem.own_parameters if q.name.endswith((".lower", ".upper"))]
+    others = [q for q in problem.own_parameters if q not in limits]
+    rows = [(code(q.name), f"{q.default:g}", literal(q.unit), literal(q.description)) for q in others]
+    more = f"And {len(limits)} limits such as `{limits[0].name}`, see `nlp-gait list {problem.name}`." if limits else ""
+    return page("## Parameters", table(("parameter", "default", "unit", "what"), rows), more).strip()
 
 
 def _options(problem: GaitProblem) -> str:
     make = find_maker(problem.name)
-    hints, words = get_type_hints(make), dict(_option_words(problem))
+    hints = get_type_hints(make)
     rows = []
     for name, parameter in inspect.signature(make).parameters.items():
         hint = hints.get(name)
         choices = ", ".join(f"`{choice}`" for choice in get_args(hint)) if get_origin(hint) is Literal else ""
-        rows.append((code(name), code(str(parameter.default)), choices, literal(words.get(name, ""))))
-    text = "Options of the problem: `--set NAME=VALUE`, or keywords of `nlp_gait.load`."
-    return page("## Options", text, table(("option", "default", "one of", "what"), rows)).strip()
+        rows.append((code(name), code(str(parameter.default)), choices))
+    text = "What they mean is [in one table](index.md#options)."
+    return page("## Options", text, table(("option", "default", "one of"), rows)).strip()
+
+
+def list_options(problems: Sequence[GaitProblem]) -> str:
+    """Return the meaning of every option once, with the problems where it means this."""
+    meanings: dict[tuple[str, str], list[str]] = {}
+    for problem in problems:
+        words = dict(_option_words(problem))
+        for name in inspect.signature(find_maker(problem.name)).parameters:
+            meanings.setdefault((name, words.get(name, "")), []).append(problem.name)
+    rows = [(code(name), literal(words), ", ".join(users)) for (name, words), users in sorted(meanings.items())]
+    text = "`--set NAME=VALUE`, or keywords of `nlp_gait.load`; parameters and bounds are set alike, without rebuilding anything."
+    return page("## Options", text, table(("option", "what", "of"), rows)).strip()
 
 
 def _option_words(problem: GaitProblem) -> Iterator[tuple[str, str]]:
@@ -338,8 +348,7 @@ def _difficulty(problem: GaitProblem, found: Difficulty | None) -> str:
             if found.feasible_points
             else f"None of {found.points} uniform random points within the bounds is feasible"
         )
-        words += f"; an evaluation takes {found.evaluation_us:.3g} µs of one core, in a batch. "
-        words += f"Each run of a search has {found.evaluations} evaluations, each run of IPOPT one random start."
+        words += f"; an evaluation takes {found.evaluation_us:.3g} µs, a run of a search has {found.evaluations}."
     else:
         words = "Its variables satisfy equations, so no candidate of a search is feasible: gradient methods only."
     header = ("solver", "runs", "feasible", "within 0.1 %", "median distance")
@@ -356,9 +365,6 @@ def _source(problem: GaitProblem) -> str:
 
 def _use(problem: GaitProblem) -> str:
     search = f"nlp-gait compare {problem.name} --out study\n" if problem.searchable else ""
-    python = f'import nlp_gait\n\nsolution = nlp_gait.solve("{problem.name}", starts={problem.hints.starts})\nsolution.plot()'
     return (
-        "## Try it\n\n```sh\n"
-        f"nlp-gait solve {problem.name} --out best.json\n{search}nlp-gait list {problem.name}\n```\n\n"
-        f"```python\n{python}\n```"
+        f"## Try it\n\n```sh\nnlp-gait solve {problem.name} --out best.json\n{search}nlp-gait list {problem.name}\n```"
     )

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 import casadi as ca
@@ -147,7 +147,8 @@ class Constraint:
     unit: str  #: of value and bounds
     scale: float  #: violation of this size counts as 1 in the total violation [unit]
     value: MX  #: (m, 1)
-    lower: MX | None = None  #: (m, 1) or scalar, a function of parameters only
+    #: (m, 1) or scalar, a function of parameters only; a number stands for ``MX(number)``
+    lower: MX | None = None
     upper: MX | None = None  #: likewise
     #: Part of the motion that the rows refer to; None if unknown. Labels of rows at samples end with a comma and the sample.
     over: Over | None = None
@@ -160,6 +161,9 @@ class Constraint:
         m = _count_rows(owner, "value", self.value)
         for end in ("lower", "upper"):
             bound = getattr(self, end)
+            if isinstance(bound, (int, float)):
+                bound = MX(bound)
+                object.__setattr__(self, end, bound)  # it is frozen
             if bound is not None and (count := _count_rows(owner, end, bound)) not in (1, m):
                 raise InputError(f"{owner}: {end} must have one row or as many as value, {m}, got {count}")
         if self.lower is None and self.upper is None:
@@ -204,7 +208,8 @@ class Assembly:
 
     objective: MX  #: scalar, in the problem's own sense
     constraints: tuple[Constraint, ...]  #: groups of rows
-    indexes: Mapping[str, MX]  #: named performance figures (scalars); meaningful under ``Exact`` only
+    #: named performance figures (scalars); meaningful under ``Exact`` only
+    indexes: Mapping[str, MX] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for owner, value in (("objective", self.objective), *((f"index {n!r}", v) for n, v in self.indexes.items())):

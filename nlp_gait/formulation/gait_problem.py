@@ -69,7 +69,7 @@ class GaitProblem:
     name: str  #: for example ``"nao-ssp"``
     title: str  #: one line
     variables: tuple[Variable, ...]  #: in the order of x
-    own_parameters: tuple[Parameter, ...]  #: limits and weights, without the variables' bounds
+    own_parameters: tuple[Parameter, ...] = ()  #: limits and weights, without the variables' bounds
     objective: Objective  #: name, unit, sense
     #: Builds objective and constraints from symbols and an interpretation
     assemble: Callable[[Point, Nonsmooth], Assembly]

@@ -126,10 +126,14 @@ def test_messages_say_what_is_wrong_with_the_file(text: str, message: str, tmp_p
         load(f"{tmp_path / 'none.py'}:leg")
 
 
+def test_a_number_is_a_bound() -> None:
+    row = Constraint(name="knee", unit="rad", scale=1.0, value=MX.sym("knee"), lower=0, upper=1.5)
+    assert [float(bound) for bound in row.columns[1:]] == [0.0, 1.5]
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"lower": 0.0}, "'knee': lower must be a CasADi MX, got float 0.0; write MX\\(0.0\\)"),
         ({"upper": "1"}, "'knee': upper must be a CasADi MX, got str '1'"),
         ({"value": None}, "'knee': value must be a CasADi MX, got NoneType"),
         ({"value": THREE}, "'knee': value has 3 rows and labels has 0; give one label per row"),
