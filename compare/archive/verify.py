@@ -115,8 +115,8 @@ def verify_folder(
     findings.append(_judge("runs", lambda: _check_plan(folder, manifest, everyone)))
     for number, path in enumerate(sorted((folder / "certificates").glob("*.json"))):
         findings.append(_judge(f"certificates/{path.name}", partial(_check_certificate, path, number)))
-    rewritten = _judge("texts", lambda: _check_texts(folder, records, manifest, evidence))
-    repeated = _repeat_runs(records, share, places, progress)
+    check_texts = partial(_judge, "texts", lambda: _check_texts(folder, records, manifest, evidence))
+    rewritten, *repeated = _repeat_runs(records, share, places, progress, check_texts)
     scope = _describe_scope(folder, records, sum(f.holds is not None for f in repeated))
     wrong = [finding for finding in repeated if not finding.holds]
     same = [Finding("repeated runs", True, f"{len(repeated) - len(wrong)} have the same results, to the last bit")]
@@ -307,8 +307,13 @@ def _choose_runs(records: Sequence[RunRecord], share: float | None) -> tuple[lis
 
 
 def _repeat_runs(
-    records: Sequence[RunRecord], share: float | None, places: Mapping[str, str], progress: Progress
+    records: Sequence[RunRecord],
+    share: float | None,
+    places: Mapping[str, str],
+    progress: Progress,
+    check_texts: Callable[[], Finding],
 ) -> list[Finding]:
+    """Return the finding about the texts, which are written next to the runs, and one for each repeated run."""
     chosen, needed = _choose_runs(records, share)
 
     def repeat(record: RunRecord) -> Finding:
@@ -318,8 +323,14 @@ def _repeat_runs(
     began = time.monotonic()
     for record in chosen[:needed]:  # built before the forks
         load_problem(_move_files(record, places))
-    first = list(compute_in_forks(repeat, chosen[:needed]))
-    return [*first, *compute_in_forks(repeat, chosen[needed:], lambda: time.monotonic() - began > FURTHER_S)]
+    calls: list[Callable[[], Finding]] = [check_texts, *(partial(repeat, record) for record in chosen)]
+    first = compute_in_forks(_call, calls[: needed + 1])
+    further = compute_in_forks(_call, calls[needed + 1 :], lambda: time.monotonic() - began > FURTHER_S)
+    return [*first, *further]
+
+
+def _call(check: Callable[[], Finding]) -> Finding:
+    return check()
 
 
 def _repeat_run(record: RunRecord, moved: RunRecord) -> str:
