@@ -48,7 +48,7 @@ ALGORITHMS = (
     "that the NAO paper cites, because the constant weight that the paper prints, `pso-constant`, does not settle; `all` stands "
     "for every installed search, IPOPT and SLSQP."
 )
-HANDLING = "Constraints in searches: deb (feasibility rules), epsilon, or penalty=WEIGHT [objective/violation]."
+HANDLING = "Constraints in searches: deb (feasibility rules), epsilon, or penalty=WEIGHT > 0 [objective/violation]."
 OUT = "Folder for records, report and figures; finished runs in it are reused."
 
 
@@ -60,7 +60,7 @@ class SearchOptions:
     seed: options.Seed = 0
     evaluations: options.Evaluations = 10_000
     handling: Annotated[str, Option(help=HANDLING)] = "deb"
-    time_limit: Annotated[float | None, Option(help="End a run after this many seconds.")] = None
+    time_limit: Annotated[float | None, Option(min=1e-3, max=1e9, help="End a run after this many seconds.")] = None
     polish: Annotated[bool, Option("--polish", help="IPOPT from each search's result, as another solver.")] = False
 
     def make_study(self, problems: Sequence[ProblemSpec], algorithms: str, starts: int) -> StudySettings:

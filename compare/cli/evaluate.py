@@ -42,7 +42,10 @@ def evaluate(
         Path | None, Option(help="Joint angles over time instead: a CSV with columns t and joints.")
     ] = None,
     touch_down: Annotated[
-        float | None, Option(help="Landing time of the swing foot of a cycle in --motion [s] (default: inferred).")
+        float | None,
+        Option(
+            min=0.0, max=300.0, help="Landing time of the swing foot of a cycle in --motion [s] (default: inferred)."
+        ),
     ] = None,
     engine: Annotated[bool, Option(help="Also simulate a motion in the physics engine (extra sim).")] = True,
     *,

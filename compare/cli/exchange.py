@@ -21,9 +21,7 @@ FINALS = "One row per run: the variables, and where known run, seed, objective, 
 HISTORY = "Best so far: run, evaluations, objective and optionally time_s."
 EVALUATIONS = "Evaluations of every run, if neither file has them; leave it out if they are unknown."
 PACK = "Check the records of the folder, and pack the study for others."
-RERUN = (
-    "Share of the runs to repeat, drawn at random (default: one of each solver and problem, more for 2 s; 0%: none)."
-)
+RERUN = "Runs to repeat, drawn at random, 0% to 100% (default: one of each solver and problem, more for 2 s)."
 
 
 @command

@@ -47,7 +47,7 @@ def certainty(
     *,
     starts: Annotated[int, Option(min=1, max=1000000, help="Random starts of IPOPT.")] = 10_000,
     evaluations: Annotated[int, Option(min=0, max=1000000000000, help=LONG_SEARCH)] = 1_000_000,
-    time_limit: Annotated[float, Option(min=0.0, help=PROOF)] = 1800.0,
+    time_limit: Annotated[float, Option(min=0.0, max=1e9, help=PROOF)] = 1800.0,
     seed: options.Seed = 0,
     problem: options.AnyProblem,
     check: Annotated[Path | None, Option(help=CHECK)] = None,

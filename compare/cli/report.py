@@ -22,7 +22,7 @@ from compare.study.settings import read_manifest
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
 
-WEIGHTS = "Evaluations counted for a first derivative and a Hessian (default: n + 1, (n + 1)(n + 2)/2)."
+WEIGHTS = "Evaluations, at least 0, counted for a first derivative and a Hessian (default: n + 1, (n + 1)(n + 2)/2)."
 CSV = "Write all runs and all judged points as CSV files too."
 LATEX = "Also write tables for papers: of each problem, and of all problems and solvers (LaTeX, package booktabs)."
 DIGITS = "Decimals of objectives in these tables (default: as many as different medians need to differ)."

@@ -33,7 +33,7 @@ FEEDBACK = (
     "none, in open loop; balance: footholds, times of steps and torques of the whole body by the measured state (extra sim); "
     "torso-spring: balance by measured place and attitude of the torso."
 )
-SLOPE = "Rise of the floor forward and to the left, added to the slope of a walk planned for one."
+SLOPE = "Rise of the floor forward and to the left, added to the slope of a walk planned for one; each below 45."
 LIVE = "Show it in MuJoCo's viewer in real time; arrow keys push the robot forward, backward, to the left and to the right."
 PUSH = "Impulse on the torso, forward and to the left [N s], and its begin [s] (default: in the middle)."
 
@@ -60,12 +60,18 @@ class DriveOptions:
 class ConditionOptions:
     """Differences of the simulated world and robot from the planned ones."""
 
-    friction: Annotated[float | None, Option(help="Coefficient of sliding friction (default: 0.7).")] = None
+    friction: Annotated[
+        float | None, Option(min=1e-3, max=1e3, help="Coefficient of sliding friction (default: 0.7).")
+    ] = None
     slope_deg: Annotated[str, Option(metavar="X,Y", help=SLOPE)] = "0,0"
-    mass_factor: Annotated[float, Option(help="On all masses; the gait was planned for 1.")] = 1.0
-    stiffness_factor: Annotated[float, Option(help="True stiffness of the joints over what their drive assumes.")] = 1.0
+    mass_factor: Annotated[float, Option(min=1e-3, max=1e3, help="On all masses; the gait was planned for 1.")] = 1.0
+    stiffness_factor: Annotated[
+        float, Option(min=1e-3, max=1e3, help="True stiffness of the joints over what their drive assumes.")
+    ] = 1.0
     push: Annotated[str | None, Option(metavar="X,Y[,S]", help=PUSH)] = None
-    bumps_mm: Annotated[float | None, Option(help="Tiles of random height on the ground, up to this.")] = None
+    bumps_mm: Annotated[
+        float | None, Option(min=1e-3, max=1e3, help="Tiles of random height on the ground, up to this.")
+    ] = None
 
     def make(self) -> Conditions:
         """Return the conditions; raises InputError for a value that is not allowed."""
@@ -95,7 +101,9 @@ class ConditionOptions:
 def simulate(
     stored: StoredGait,
     *,
-    steps: Annotated[int | None, Option(help="Simulate this many steps of a gait that repeats.")] = None,
+    steps: Annotated[
+        int | None, Option(min=1, max=1000, help="Simulate this many steps of a gait that repeats.")
+    ] = None,
     out: Annotated[Path | None, Option(help="Folder for report, time histories, model and figure."), OUTPUT] = None,
     page: Annotated[
         Path | None, Option(metavar="FILE.html", help="Page that plays the simulation in 3-D."), OUTPUT_FILE

@@ -26,14 +26,14 @@ from nlp_gait.proofs.guarantee import guarantee
 
 SHOWN_MARGINS = 4
 LINEAR_SOLVER = "Linear solver of IPOPT, for example ma57 if its library is installed (default: mumps)."
-SPEEDS = "Speeds of the inner steps [m/s], separated by commas; between them it changes evenly."
+SPEEDS = "Speeds > 0 of the inner steps [m/s], separated by commas; between them it changes evenly."
 TURN = "Turn to the left along an arc, by 15 degrees with each step unless --steps; negative turns to the right."
 FOOTHOLDS = "CSV file with columns x_m,y_m,z_m,yaw_deg: where the right foot, the left foot and so on land."
 OF_A_WALK = "intervals (of each phase), or a parameter or bound of nao-walk or humanoid-walk; repeatable."
 
 
 MARGINS = (
-    f"Least distance of the ZMP from the edges of its support, as shares of a sole's length and width (default: "
+    f"Least distance of the ZMP from the edges of its support, as shares below 0.5 of a sole's length and width (default: "
     f"{MARGINS_OF_SOLE[0]:g},{MARGINS_OF_SOLE[1]:g}); 0,0 for the cheapest walk."
 )
 
@@ -133,14 +133,18 @@ def plan(
         int | None,
         Option(min=2, max=1000, help="Swings of a foot, both half steps included (default: 10, or by distance)."),
     ] = None,
-    speed: Annotated[float | None, Option(help="Speed of the inner steps [m/s] (default: the cheapest).")] = None,
+    speed: Annotated[
+        float | None, Option(min=1e-3, max=1e3, help="Speed of the inner steps [m/s] (default: the cheapest).")
+    ] = None,
     speeds: Annotated[str, Option(help=SPEEDS)] = "",
-    distance: Annotated[float | None, Option(help="Distance that the feet advance [m].")] = None,
-    slope_deg: Annotated[float, Option(help="By which the ground rises forward; negative falls.")] = 0.0,
+    distance: Annotated[float | None, Option(min=1e-3, max=1e6, help="Distance that the feet advance [m].")] = None,
+    slope_deg: Annotated[
+        float, Option(min=-45.0, max=45.0, help="By which the ground rises forward; negative falls.")
+    ] = 0.0,
     stairs: Annotated[
         str, Option(metavar="RISExRUN:N", help="Climb N treads of this rise and depth [m], one with each step.")
     ] = "",
-    turn_deg: Annotated[float, Option(help=TURN)] = 0.0,
+    turn_deg: Annotated[float, Option(min=-36000.0, max=36000.0, help=TURN)] = 0.0,
     footholds: Annotated[Path | None, Option(help=FOOTHOLDS)] = None,
     margins: Annotated[str | None, Option(metavar="ALONG,ACROSS", help=MARGINS)] = None,
     values: Annotated[list[str] | None, Option("--set", metavar="NAME=VALUE", help=OF_A_WALK)] = None,

@@ -107,7 +107,7 @@ def find_cache_folder() -> Path:
     """Return the folder of cached libraries: ``$NLP_GAIT_CACHE``, else nlp-gait in ``$XDG_CACHE_HOME`` or ~/.cache.
 
     It is created if necessary, with its parents. If it is a link, belongs to another user, cannot be created, forbids to load
-    code, or if another user may exchange it, a temporary folder of this process is used instead.
+    code, has a name that is not UTF-8, or if another user may exchange it, a temporary folder of this process is used instead.
     """
     named = os.environ.get(FOLDER_VARIABLE)
     base = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "nlp-gait"
@@ -116,12 +116,14 @@ def find_cache_folder() -> Path:
             base = Path.home().joinpath(*base.parts[1:])  # RuntimeError in a container whose user has no home
         base = base.parent.resolve() / base.name
         make_folder(base, mode=0o700)
-        reason = _find_danger(base.lstat(), stat.S_ISDIR) or _find_danger_above(base)
+        reason = None if _is_text(base) else "its name is not valid UTF-8"  # threadpoolctl decodes names of libraries
+        reason = reason or _find_danger(base.lstat(), stat.S_ISDIR) or _find_danger_above(base)
         reason = reason or ("its mount has the option noexec" if _forbids_code(base) else None)
     except (OSError, RuntimeError) as error:
         reason = str(error)
     if reason is not None:
-        warn_once(f"the cache folder {base} cannot be used ({reason}); compiled code is stored for this process only")
+        shown = os.fsencode(base).decode(errors="replace")
+        warn_once(f"the cache folder {shown} cannot be used ({reason}); compiled code is stored for this process only")
     return base if reason is None else make_private_folder()
 
 
@@ -155,6 +157,10 @@ def _find_danger_above(folder: Path) -> str | None:
     return None
 
 
+def _is_text(folder: Path) -> bool:
+    return os.fsencode(folder) == str(folder).encode(errors="replace")
+
+
 def _forbids_code(folder: Path) -> bool:
     return hasattr(os, "statvfs") and bool(os.statvfs(folder).f_flag & getattr(os, "ST_NOEXEC", 0))
 
@@ -164,7 +170,9 @@ def make_private_folder() -> Path:
     """Return a folder that only this process uses, created when it is first needed and removed at the end."""
     with convert_errors("no folder for temporary files", CompilerError, "free some disk space, or name one in TMPDIR"):
         places = [tempfile.gettempdir(), "/var/tmp", "/dev/shm"]
-        place = next((p for p in places if os.access(p, os.W_OK) and not _forbids_code(Path(p))), None)
+        place = next(
+            (p for p in places if os.access(p, os.W_OK) and _is_text(Path(p)) and not _forbids_code(Path(p))), None
+        )
         if place is None:
             raise OSError(f"no code may be loaded from {', '.join(places)}: their mounts have the option noexec")
         folder = Path(tempfile.mkdtemp(prefix="nlp-gait-", dir=place)).resolve()

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from threadpoolctl import ThreadpoolController
 
 from nlp_gait.backends.kernel import compiler as compiler_module
 from nlp_gait.backends.kernel import library_cache
@@ -103,6 +104,16 @@ def test_a_cache_that_cannot_be_made_or_trusted(
         assert len(caplog.messages) == 1 and "cannot be used" in caplog.messages[0]
         assert not any(target.iterdir())
         cache.rmdir() if cache.is_dir() and not cache.is_symlink() else cache.unlink()
+
+
+def test_a_folder_whose_name_is_not_text_has_no_library_that_threadpoolctl_cannot_name(
+    compiler: Compiler, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv(library_cache.FOLDER_VARIABLE, os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
+    library_cache.warn_once.cache_clear()
+    assert answer(compiler)[0] == 42
+    assert len(caplog.messages) == 1 and "its name is not valid UTF-8" in caplog.messages[0]
+    assert ThreadpoolController().lib_controllers
 
 
 def _open_to_all(folder: Path) -> None:

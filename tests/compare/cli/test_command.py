@@ -68,6 +68,7 @@ def test_help_names_the_options_of_a_group_in_their_place() -> None:
         ([], 2, "Missing argument 'FRUIT'"),
         (["plum", "--weight", "heavy"], 2, "Invalid value for '--weight'"),
         (["plum", "--weight", "-1"], 1, "nlp-gait: --weight must be positive, got -1.0\n"),
+        (["plum", "--weight", "nan"], 1, "nlp-gait: --weight-g must be a finite number, got nan\n"),
     ],
 )
 def test_a_group_refuses_as_a_command_does(arguments: list[str], status: int, words: str) -> None:

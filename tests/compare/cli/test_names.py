@@ -13,6 +13,15 @@ def test_each_option_has_a_text():
         assert [option.name for option in made.params if not (option.help or option.metavar)] == [], name
 
 
+def test_each_number_states_its_limits():
+    """Click shows those of a range in the help; the seed alone has no largest value."""
+    for name, made in COMMANDS.items():
+        for option in made.params:
+            kind = option.type_descriptor.annotation
+            assert kind not in (int, float) or option.min is not None, (name, option.name)
+            assert kind is not float or option.max is not None, (name, option.name)
+
+
 @pytest.mark.parametrize("name", REPLACEMENTS)
 def test_a_removed_name_is_gone(name):
     command, _, option = name.partition("--")

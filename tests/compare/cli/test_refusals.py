@@ -43,7 +43,6 @@ REFUSED = {
     "compare nao-ssp --handling penalty --out {new}": "penalty=WEIGHT",
     "compare nao-ssp --handling dep --out {new}": "unknown constraint handling 'dep'|deb",
     "compare nao-ssp --handling deb=2 --out {new}": "others none",
-    "compare nao-ssp --time-limit -1 --out {new}": "time_limit_s must be",
     "compare gb2:absent:3 --out {new}": "unknown family of GaitBench 2",
     "report {new}": "contains no records",
     "reproduce walk1 --out {new}": "unknown reproduction 'walk1'; did you mean 'walk12'?",
