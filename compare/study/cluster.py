@@ -13,8 +13,10 @@ from nlp_gait.user_code import Kind, PackedCode, is_user_code, pack_code, unpack
 CONNECT_TIMEOUT = "10s"
 
 
-def run_on_cluster(tasks: Mapping[int, Task], scheduler: str) -> Iterator[tuple[int, RunRecord]]:
-    """Run tasks on the workers of a scheduler, and yield the key and the record of each as it finishes.
+def run_on_cluster(
+    tasks: Mapping[int, tuple[Task, RunRecord | None]], scheduler: str
+) -> Iterator[tuple[int, RunRecord]]:
+    """Run tasks as ``run_tasks`` on the workers of a scheduler, and yield the key and the record of each as it finishes.
 
     The scheduler repeats the runs of a worker that dies.
 
@@ -31,10 +33,10 @@ def run_on_cluster(tasks: Mapping[int, Task], scheduler: str) -> Iterator[tuple[
         logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are reported in one sentence
     with convert_errors(f"no Dask scheduler answers at {scheduler!r}", InputError, "start one with `dask scheduler`"):
         client = Client(scheduler, timeout=CONNECT_TIMEOUT)
-    code = _pack_code(tasks.values())
+    code = _pack_code(task for task, _ in tasks.values())
     with client:
         try:
-            futures = {client.submit(_try_task, code, task, pure=False): key for key, task in tasks.items()}
+            futures = {client.submit(_try_task, code, *call, pure=False): key for key, call in tasks.items()}
             for future in as_completed(futures):
                 yield futures[future], future.result()
         except Exception as error:  # of Dask, or of the worker's own Python, which may lack a package
@@ -45,10 +47,10 @@ def run_on_cluster(tasks: Mapping[int, Task], scheduler: str) -> Iterator[tuple[
             ) from error
 
 
-def _try_task(code: Sequence[PackedCode], task: Task) -> RunRecord:
+def _try_task(code: Sequence[PackedCode], task: Task, search: RunRecord | None) -> RunRecord:
     for packed in code:
         unpack_code(packed)
-    return try_task(task)
+    return try_task(task, search)
 
 
 def _pack_code(tasks: Iterable[Task]) -> tuple[PackedCode, ...]:

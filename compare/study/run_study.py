@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,10 +27,13 @@ from nlp_gait.progress import Progress
 DEATHS_WITHOUT_PROGRESS = 3
 
 
-def run_tasks(tasks: Sequence[Task], workers: int = 1, scheduler: str | None = None) -> Iterator[tuple[int, RunRecord]]:
-    """Run tasks in their order, and yield the position and the record of each as it finishes.
+def run_tasks(
+    tasks: Sequence[tuple[Task, RunRecord | None]], workers: int = 1, scheduler: str | None = None
+) -> Iterator[tuple[int, RunRecord]]:
+    """Run tasks in their order, each with the record of the search that it polishes, if there is one.
 
-    One worker is this process; the address of a Dask scheduler stands for its workers instead.
+    Yields the position and the record of each as it finishes. One worker is this process; the address of a Dask scheduler stands
+    for its workers instead.
 
     Raises:
         WorkerError: worker processes keep dying, or the cluster is lost.
@@ -38,11 +41,11 @@ def run_tasks(tasks: Sequence[Task], workers: int = 1, scheduler: str | None = N
     """
     is_alone = scheduler is None and (workers == 1 or len(tasks) <= 1)
     waiting = dict(enumerate(tasks))
-    for position, task in enumerate(tasks):
+    for position, (task, _) in enumerate(tasks):
         # A GaitProblem has symbols and functions, which cannot leave this process.
         if is_alone or not isinstance(task.problem.name, str):
             with remember_interrupts() as check:
-                record = try_task(waiting.pop(position))
+                record = try_task(*waiting.pop(position))
                 check()
             yield position, record
     if waiting and scheduler is not None:
@@ -51,7 +54,7 @@ def run_tasks(tasks: Sequence[Task], workers: int = 1, scheduler: str | None = N
     deaths = 0
     while waiting:
         try:
-            calls = {position: partial(try_task, task) for position, task in waiting.items()}
+            calls = {position: partial(try_task, *call) for position, call in waiting.items()}
             for position, record in run_in_processes(calls, min(workers, len(calls))):
                 del waiting[position]
                 deaths = 0
@@ -188,15 +191,18 @@ def _load_records(study: Study) -> tuple[dict[int, RunRecord], Counter[tuple[str
 
 
 def _run_missing(study: Study, records: dict[int, RunRecord]) -> Iterator[tuple[int, RunRecord]]:
-    """Run the tasks without a record; yield their indices and records as they finish."""
+    """Run the tasks without a record, those that polish last; yield their indices and records as they finish."""
     waiting = [index for index in range(len(study.tasks)) if index not in records]
     if study.scheduler is None:
         _prepare_solvers([study.tasks[index] for index in waiting])
     # Long runs first, to balance the load; and runs of all problems in turn.
     waiting.sort(key=lambda index: (study.tasks[index].is_search, study.tasks[index].run))
-    tasks = [study.tasks[index] for index in waiting]
-    for position, record in run_tasks(tasks, study.jobs, study.scheduler):
-        yield waiting[position], record
+    for polish in (False, True):
+        chosen = [(index, study.tasks[index]) for index in waiting if study.tasks[index].polish == polish]
+        searches = {record.inputs.key: record for record in records.values()} if polish else {}
+        tasks = [(task, searches.get(replace(task.inputs(), polish=False).key)) for _, task in chosen]
+        for position, record in run_tasks(tasks, study.jobs, study.scheduler):
+            yield chosen[position][0], record
 
 
 def _prepare_solvers(tasks: Sequence[Task]) -> None:

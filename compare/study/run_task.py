@@ -52,15 +52,15 @@ def run_task(task: Task, callback: Callable[..., None] | None = None) -> RunReco
     return _solve(task, search) if task.polish else search
 
 
-def try_task(task: Task, run: Run = run_task) -> RunRecord:
+def try_task(task: Task, search: RunRecord | None = None, run: Run = run_task) -> RunRecord:
     """Perform one run; whatever fails in it becomes its record instead of ending the study.
 
     User code runs in its own process, which is killed if it does not return; this one evaluates what it proposes, counts and
-    judges. IPOPT polishes its result in this one.
+    judges. IPOPT polishes its result in this one, or that of ``search``, the record of the same run without polishing.
     """
-    if not task.is_user_code:
+    if search is None and not task.is_user_code:
         return _run_caught(task, run)
-    search = _run_isolated(replace(task, polish=False), run)
+    search = search or _run_isolated(replace(task, polish=False), run)
     return _run_caught(task, partial(_solve, search=search)) if task.polish else search
 
 

@@ -80,6 +80,7 @@ def test_a_polished_run_carries_the_search_before_it(undisturbed: Path) -> None:
     assert polished.evaluations["f"] > search.evaluations["f"] == 500 and polished.evaluations["jacobian"] > 0
     assert polished.history.evaluations[:-1] == search.history.evaluations
     assert polished.time_s.solve > search.time_s.solve
+    assert polished.time_s.history[:-1] == search.time_s.history  # it is that run, not a repeated one
     assert polished.active_constraints and not search.active_constraints
 
 
