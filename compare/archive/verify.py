@@ -279,6 +279,8 @@ def _describe_scope(folder: Path, records: Sequence[RunRecord], repeated: int) -
                  for path in (folder / RECORDS).glob("*/*.json"))  # fmt: skip
     parts = [f"the course of {len(records) - repeated} runs that were not repeated", "times and machines: as recorded"]
     parts += ["runs that were made, but never listed"]
+    if any(isinstance(record.inputs.solver, Mapping) for record in records):
+        parts += ["evaluations that user code makes by loading the problem itself"]
     parts += [f"{others} other records in the folder"] if others else []
     foreign = [p.name for p in sorted(folder.iterdir()) if p.is_file() and p.suffix in (".tex", ".pdf", ".png")]
     parts += [f"{_list_some(foreign)}"] if foreign else []

@@ -201,8 +201,9 @@ def test_user_code_and_robots_travel_with_the_archive(
     monkeypatch.chdir(away)
     manifest, differences = unpack_archive(archive, away / "unpacked")
     assert {p.name for p in (away / "unpacked" / "code").iterdir()} == {"mine.py", "helper.py"} and not differences
-    findings = verify_folder(away / "unpacked", robots=manifest.robots).findings
-    assert [f.sentence for f in findings if f.holds is False] == []
+    found = verify_folder(away / "unpacked", robots=manifest.robots)
+    assert [f.sentence for f in found.findings if f.holds is False] == []
+    assert "evaluations that user code makes by loading the problem itself" in found.scope[1]
     (away / "unpacked" / "code" / "helper.py").write_text("def middle(a, b):\n    return a\n")
     assert [f.holds for f in _check_code_files(away / "unpacked", read_records(away / "unpacked"))] == [False]
 
