@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import itertools
-import json
 import multiprocessing
 import os
 import signal
@@ -12,12 +11,10 @@ import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing.synchronize import Barrier
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from joblib.externals.loky import get_reusable_executor
@@ -27,52 +24,19 @@ from compare.__main__ import fix_environment
 from compare.study.record import RunRecord
 from compare.study.record_files import find_record, read_records, write_records
 from compare.study.run_study import Study, run_study
+from compare.study.settings import Session, SolverSpec, StudySettings, read_manifest, write_manifest
 from compare.study.task import ProblemSpec, Stop, Task
 from metaheuristics import ParticleSwarm
-from metaheuristics.errors import SearchError
 from metaheuristics.interface import Search, Start
-from metaheuristics.settings import check_installed
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.errors import NoWorkersError, WorkerError
-from nlp_gait.files import remove_leftovers
 from nlp_gait.processes import run_in_processes
 from tests.compare.cli import calls
-from tests.compare.questions.test_contract import without_times
-from tests.faults.processes import ROOT, fake_compiler, start
+from tests.faults.processes import ROOT, fake_compiler, start, wait_for
 
-STEM = "walk12-sweep-step_length_m-ipopt"
 SECONDS = 10.0  # within which all must have ended; on an idle machine it takes one
 WALK = ProblemSpec(name="walk12")
 STUDIES, RUNS = 3, 6
-
-
-def wait_for(condition: Callable[[], bool], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
-@pytest.mark.slow
-def test_a_sweep_killed_and_interrupted_ends_as_undisturbed(tmp_path: Path, undrawn_pictures: None) -> None:
-    command = ("sweep", "walk12", "--over", "step_length_m=0.06:0.12:4", "--starts", "1", "--out")
-    calls.nlp_gait(*command, tmp_path / "undisturbed")
-    killed, steps = tmp_path / "killed", tmp_path / "killed" / "store"
-    for number, wanted in ((signal.SIGKILL, 2), (signal.SIGINT, 4)):
-        process = start(*command, str(killed))
-        wait_for(lambda: process.poll() is not None or len(list(steps.glob("solve-*.json"))) >= wanted)  # noqa: B023
-        process.send_signal(number)
-        _, messages = process.communicate(timeout=60)
-        assert process.returncode == (-9 if number == signal.SIGKILL else 130), messages
-        for path in steps.glob("*.json"):
-            json.loads(path.read_text())  # whole or absent
-    assert messages.splitlines()[-1].endswith("; rerun the command to continue")
-    assert "results were stored by an earlier run" in calls.nlp_gait(*command, killed).stderr
-    whole, resumed = (
-        (without_times(json.loads((folder / f"{STEM}.json").read_text())), {f.name for f in folder.glob("store/*")})
-        for folder in (tmp_path / "undisturbed", killed)
-    )
-    assert resumed == whole and len(whole[0]["points"]) == 4
 
 
 def make_task(evaluations: int, run: int, label: str = "") -> Task:
@@ -95,40 +59,32 @@ class DiesOnce(ParticleSwarm):
 @pytest.mark.slow
 def test_a_worker_that_dies_in_the_middle_costs_no_run(tmp_path: Path) -> None:
     solver = DiesOnce(marker=str(tmp_path / "dead"))
-    tasks = tuple(replace(make_task(300, run), solver=solver) for run in range(6))
+    tasks = tuple(replace(make_task(300, run), solver=solver) for run in range(4))
     dying = run_study(Study(tasks=tasks, folder=tmp_path / "study", jobs=2))
-    assert (tmp_path / "dead").exists() and len(read_records(tmp_path / "study")) == 6
+    assert (tmp_path / "dead").exists() and len(read_records(tmp_path / "study")) == 4
     undisturbed = run_study(Study(tasks=tuple(replace(task, solver=ParticleSwarm()) for task in tasks)))
     assert [record.x for record in dying] == [record.x for record in undisturbed]
 
 
-def list_processes() -> dict[int, tuple[int, str]]:
-    """Return the parent and the command line of each process that has not ended, by its number."""
+def list_offspring(parent: int) -> dict[int, str]:
+    """Return the command lines of living processes that a process, or one of those, has started, by number; of all for 0."""
     processes = {}
     for entry in Path("/proc").iterdir():
         try:
-            state, parent, *_ = (entry / "stat").read_text().rpartition(")")[2].split()
+            state, above, *_ = (entry / "stat").read_text().rpartition(")")[2].split()
             command = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
-            processes |= {int(entry.name): (int(parent), command)} if state != "Z" else {}
+            processes |= {int(entry.name): (int(above), command)} if state != "Z" else {}
         except (OSError, ValueError):  # ended meanwhile, or no process
             continue
-    return processes
-
-
-def list_offspring(parent: int) -> dict[int, str]:
-    """Return the command lines of the processes that a process has started, and of those that they have, by number."""
-    processes, below = list_processes(), set[int]()
-    while new := {child for child, (above, _) in processes.items() if above in below | {parent}} - below:
+    below = {parent}
+    while new := {child for child, (above, _) in processes.items() if above in below} - below:
         below |= new
-    return {child: processes[child][1] for child in below}
+    return {child: processes[child][1] for child in below & processes.keys() - {parent}}
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
-@pytest.mark.parametrize(
-    ("name", "started"),
-    [("SIGHUP", "loky"), ("SIGKILL", "loky")] + [(name, "sleep 600") for name in ("SIGINT", "SIGTERM", "SIGKILL")],
-)
+@pytest.mark.parametrize(("name", "started"), [("SIGKILL", "loky"), ("SIGINT", "sleep 600"), ("SIGTERM", "sleep 600")])
 def test_workers_and_compilers_end_with_what_started_them(name: str, started: str, tmp_path: Path) -> None:
     if started == "loky":
         line = "compare walk12 --algorithms pso --runs 4 --evaluations 90000000 --jobs 2 --out"
@@ -137,9 +93,8 @@ def test_workers_and_compilers_end_with_what_started_them(name: str, started: st
         compiler = {"CXX": fake_compiler(tmp_path, "sleep 600 & wait")}
         cache = {library_cache.FOLDER_VARIABLE: str(tmp_path / "cache")}
         program = "import nlp_gait; nlp_gait.compile_objective(nlp_gait.load('walk12'))"
-        process = subprocess.Popen(
-            [sys.executable, "-c", program], cwd=ROOT, env={**os.environ, **compiler, **cache}, text=True
-        )
+        call = [sys.executable, "-c", program]
+        process = subprocess.Popen(call, cwd=ROOT, env={**os.environ, **compiler, **cache}, text=True)
     count = 2 if started == "loky" else 1
     try:
         wait_for(lambda: sum(started in text for text in list_offspring(process.pid).values()) >= count)
@@ -148,16 +103,18 @@ def test_workers_and_compilers_end_with_what_started_them(name: str, started: st
     finally:
         os.kill(process.pid, getattr(signal, name))
         process.communicate(timeout=30)
-    wait_for(lambda: not offspring.keys() & list_processes().keys(), SECONDS)
+    wait_for(lambda: not offspring.keys() & list_offspring(0).keys(), SECONDS)
 
 
 def write_study(folder: Path, study: int, barrier: Barrier) -> None:
-    """Write all records of a study, in step with the others, and read those of this study back in between."""
+    """Write all records of a study, in step with the others, read those of this study back in between, and add sessions."""
     tasks = [make_task(50 + study, run, f"study {study}") for run in range(RUNS)]
     records = [RunRecord.make_failed(task, "tried") for task in tasks]
+    settings = StudySettings(problems=(WALK,), solvers=(SolverSpec(name="random"),))
     for count in range(1, RUNS + 1):
         barrier.wait(60)
         write_records(records[:count], folder)
+        write_manifest(folder, settings, Session.begin(f"study {study}", "1"))
         stored = find_record(folder, tasks[count - 1])
         assert stored is not None and stored.inputs.stop["evaluations"] == 50 + study
         assert len(read_records(folder)) >= count  # as for the report, while others write
@@ -180,6 +137,7 @@ def test_several_studies_in_one_folder_lose_nothing(tmp_path: Path) -> None:
     assert [job.exitcode for job in jobs] == [0] * len(jobs)
     stored = sorted((r.inputs.stop["evaluations"], r.run) for r in read_records(tmp_path))
     assert stored == [(50 + study, run) for study in range(STUDIES) for run in range(RUNS)]
+    assert len(read_manifest(tmp_path).sessions) == len(studies) * RUNS
 
 
 def test_durations_do_not_follow_the_clock_on_the_wall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,23 +150,6 @@ def test_durations_do_not_follow_the_clock_on_the_wall(tmp_path: Path, monkeypat
         assert list(times.history) == sorted(times.history)
     solution = nlp_gait.solve(nlp_gait.load("walk12"))
     assert min(solution.time_s.build, solution.time_s.compile, solution.starts[0].time_s) >= 0.0
-
-
-def test_records_from_the_future_are_kept_and_their_leftovers_go(tmp_path: Path) -> None:
-    study = Study(tasks=(make_task(300, 0),), folder=tmp_path)
-    run_study(study)
-    (record,) = tmp_path.glob("records/*/*.json")
-    leftover, ahead = record.with_name(".0123456789abcdef.tmp"), time.time() + 86_400.0
-    leftover.write_text("{")
-    for path in (record, leftover):
-        os.utime(path, (ahead, ahead))
-    kept: list[int] = []
-    run_study(study, on_stored=kept.append)
-    assert kept == [1] and record.stat().st_mtime == pytest.approx(ahead) and not leftover.exists()
-    fresh = tmp_path / ".fedcba9876543210.tmp"
-    fresh.write_text("{")
-    remove_leftovers(tmp_path)
-    assert fresh.exists()  # another process may be writing it
 
 
 @pytest.mark.slow
@@ -270,17 +211,9 @@ def test_a_limit_of_open_files_is_one_sentence_and_keeps_runs(tmp_path: Path, un
     assert len(list(tmp_path.glob("records/*/*.json"))) == 2
 
 
-@pytest.mark.parametrize("width", ["0", "-5", "", "wide", "1e3", "٣", "0000", "80"])
+@pytest.mark.parametrize("width", ["0", "-5", "", "wide", "٣", "80"])
 def test_a_terminal_without_a_width_has_the_usual_one(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", width)
     monkeypatch.setenv("MPLBACKEND", "nonsense")
     fix_environment()
     assert os.environ.get("COLUMNS") == ("80" if width == "80" else None) and os.environ["MPLBACKEND"] == "agg"
-
-
-def test_pycma_without_docstrings_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("metaheuristics.settings.is_installed", lambda package: True)
-    monkeypatch.setattr(sys, "flags", SimpleNamespace(optimize=2))
-    with pytest.raises(SearchError, match="PYTHONOPTIMIZE"):
-        check_installed("cma", "cma")
-    check_installed("pymoo:GA", "pymoo")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Callable
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,6 +33,7 @@ from metaheuristics.adapters.cma import CmaEs
 from metaheuristics.adapters.pymoo import Pymoo
 from metaheuristics.algorithms.differential_evolution import DifferentialEvolution, LShade
 from metaheuristics.multi_objective import make_front_algorithm
+from metaheuristics.settings import check_installed
 
 
 @pytest.mark.parametrize(
@@ -134,3 +137,11 @@ def test_the_settings_of_goswami_2008() -> None:
         SinglePoint(probability=0.8),
         Flip(probability=0.1),
     )
+
+
+def test_pycma_without_docstrings_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("metaheuristics.settings.is_installed", lambda package: True)
+    monkeypatch.setattr(sys, "flags", SimpleNamespace(optimize=2))
+    with pytest.raises(SearchError, match="PYTHONOPTIMIZE"):
+        check_installed("cma", "cma")
+    check_installed("pymoo:GA", "pymoo")

@@ -284,6 +284,9 @@ def test_leftovers_of_a_killed_process_go(tmp_path: Path) -> None:
     long_ago = time.time() - 3600
     for path in (old, *(tmp_path / name for name in others)):
         os.utime(path, (long_ago, long_ago))
+    ahead = tmp_path / ".2123456789abcdef.tmp"  # the clock was set back
+    ahead.write_text("")
+    os.utime(ahead, (time.time() + 86_400.0,) * 2)
     remove_leftovers(tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {new.name, record.name, *others}
 
