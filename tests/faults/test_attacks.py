@@ -33,7 +33,7 @@ from nlp_gait import load
 from nlp_gait.errors import GaitError
 from nlp_gait.export.c_files import format_comment
 from nlp_gait.robots import load_robot
-from tests.faults.forged_archives import write_zip
+from tests.compare.archive.forged_archives import change_places, write_zip
 from tests.robots.custom import humanoid
 
 Raw = dict[str, Any]
@@ -58,16 +58,11 @@ def honest(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def edit(*changes: tuple[str, Any], solver: str = "pso") -> Forgery:
-    """Return the forgery that changes places, keys separated by dots, in all records of a solver."""
+    """Return the forgery that changes places in all records of a solver."""
 
     def forge(records: dict[str, Raw], study: Raw) -> None:
         for raw in (raw for raw in records.values() if raw["solver"] == solver):
-            for place, value in changes:
-                *above, last = [int(key) if key.lstrip("-").isdigit() else key for key in place.split(".")]
-                parent: Any = raw
-                for key in above:
-                    parent = parent[key]
-                parent[last] = value(parent[last]) if callable(value) else value
+            change_places(raw, changes)
 
     return forge
 

@@ -22,7 +22,7 @@ from compare.study.task import ProblemSpec, Stop
 from nlp_gait.errors import InputError, UserCodeError
 from nlp_gait.proofs.certificate import load_certificates
 from nlp_gait.user_code import allow_code
-from tests.faults.forged_archives import Files, damage, edit, forge, sign, write_zip
+from tests.compare.archive.forged_archives import Files, damage, edit, forge, sign, write_zip
 from tests.robots.crooked import crooked, crooked_urdf
 from tests.robots.test_mjcf import plain_urdf
 

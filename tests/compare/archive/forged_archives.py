@@ -7,7 +7,8 @@ import io
 import json
 import stat
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
 
 Files = dict[str, bytes]
 
@@ -39,6 +40,16 @@ def edit(files: Files, name: str, change: Callable[[dict], object]) -> Files:
     raw = json.loads(files[name])
     change(raw)
     return sign({**files, name: json.dumps(raw).encode()})
+
+
+def change_places(raw: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None:
+    """Change places of plain data, keys separated by dots, to a value or by a function of the present one."""
+    for place, value in changes:
+        *above, last = [int(key) if key.lstrip("-").isdigit() else key for key in place.split(".")]
+        parent: Any = raw
+        for key in above:
+            parent = parent[key]
+        parent[last] = value(parent[last]) if callable(value) else value
 
 
 def damage(files: Files, record: str) -> Iterator[tuple[str, bytes, str]]:
