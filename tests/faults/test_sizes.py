@@ -29,7 +29,7 @@ def test_a_sweep_is_as_large_as_its_grid() -> None:
         Sweep(problem=load("walk12"), axes=axes)
 
 
-@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp", "nao-ssp-free", "nao-cycle"])
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle"])
 def test_a_grid_is_as_large_as_its_samples(name: str) -> None:
     with pytest.raises(InputError, match=f"at most {LARGEST_COUNT} intervals in all, got intervals "):
         load(name, intervals=LARGEST_COUNT // 10, samples_per_interval=12)
@@ -37,7 +37,7 @@ def test_a_grid_is_as_large_as_its_samples(name: str) -> None:
         load(name, samples_per_interval=LARGEST_COUNT)  # with the intervals that it has by itself
 
 
-@pytest.mark.parametrize("duration_s", [1e8, 1e308, -5.0, 0.0, 1e-300, 1.01 * LONGEST_S])
+@pytest.mark.parametrize("duration_s", [1e308, 0.0, 1e-300, 1.01 * LONGEST_S])
 def test_a_gait_without_a_duration_is_not_drawn_simulated_or_exported(duration_s: float, tmp_path: Path) -> None:
     problem = load("nao-ssp")
     x = {**problem.by_name((problem.lower + problem.upper) / 2), "single_support_time_s": duration_s}
@@ -53,20 +53,15 @@ def test_a_gait_without_a_duration_is_not_drawn_simulated_or_exported(duration_s
     assert [file.name for file in tmp_path.iterdir()] == ["result.json"]
 
 
-@pytest.mark.parametrize(
-    ("steps", "message"),
-    [
-        (10**9, f"at most {MOST_STEPS} steps are simulated, got 1000000000; use fewer"),
-        (
-            MOST_STEPS,
-            rf"{MOST_STEPS} steps of this gait last [0-9.]+ s, and at most {LONGEST_PLAYED_S:g} s are simulated",
-        ),
-    ],
-)
-def test_the_length_of_a_simulated_walk_is_limited(steps: int, message: str) -> None:
+def test_the_length_of_a_simulated_walk_is_limited() -> None:
     walk = load("nao-cycle", intervals=2)
-    with pytest.raises(InputError, match=message):
-        make_plan(Result(problem=walk, x=(walk.lower + walk.upper) / 2), steps)
+    result, longest = Result(problem=walk, x=walk.upper), f"at most {LONGEST_PLAYED_S:g} s are simulated"
+    for steps, words in (
+        (60, rf"60 steps of this gait last 360 s, and {longest}"),
+        (10**9, f"at most {MOST_STEPS} steps"),
+    ):
+        with pytest.raises(InputError, match=words):
+            make_plan(result, steps)
 
 
 @pytest.mark.parametrize("owner", [Drive, Feedback])

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import copy
+import io
 import multiprocessing
 import os
-import pickle
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+import warnings
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +18,7 @@ import pytest
 
 import nlp_gait
 from compare.judge import evaluate
-from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
-from tests.backends.toys import corner, toy
 from tests.faults.processes import ROOT
 
 EXAMPLE = ROOT / "examples" / "bring_your_own.py"
@@ -134,51 +131,40 @@ def test_what_was_used_goes_to_other_processes(program: str, method: str, tmp_pa
     assert done.stdout == "equal\n", done.stderr
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        pytest.param(lambda: nlp_gait.load("walk12").with_values(**{"lambda": 0.15}), id="values"),
-        pytest.param(
-            lambda: nlp_gait.load("nao-ssp", robot="nao-v5@mass=1.05", intervals=10).fix(swing_height_m=0.024),
-            id="options",
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(lambda: nlp_gait.load("nao-dsp").dense(2), id="dense", marks=pytest.mark.slow),
-        pytest.param(lambda: nlp_gait.load(f"{EXAMPLE}:two_link", intervals=10), id="own code"),
-    ],
-)
-def test_a_problem_is_pickled_as_its_maker_options_and_values(make: Callable[[], GaitProblem]) -> None:
-    problem = make()
-    text = pickle.dumps(problem)
-    assert len(text) < 20_000
-    again = pickle.loads(text)
-    assert (again.address, again.options, again.values) == (problem.address, problem.options, problem.values)
-    first, second = (made.start_point(np.random.default_rng(0)) for made in (problem, again))
-    assert np.array_equal(first, second) and evaluate(problem, first).violation == evaluate(again, first).violation
-    assert build_exact_model(pickle.loads(text)) is build_exact_model(again)  # built once
-    assert copy.deepcopy(problem) is copy.copy(problem) is problem
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+# Numbers are printed to the last bit.
+SOLVERS = """
+import metaheuristics, nlp_gait
+from compare.study.task import GRADIENT_SOLVERS, list_solvers
+from nlp_gait.backends.solvers.registry import make_solver
+problem = nlp_gait.load("nao-ssp", intervals=4)
+objective = nlp_gait.compile_objective(problem, threads=1)
+for name in list_solvers():
+    if name in GRADIENT_SOLVERS:
+        continue
+    found = metaheuristics.minimize(objective, metaheuristics.make_algorithm(name), evaluations=170, seed=1)
+    print(name, found.evaluations, found.objective.hex(), [value.hex() for value in found.x.tolist()])
+for name, settings in (("ipopt", {}), ("slsqp", {"evaluations": 100})):
+    outcome = make_solver(name, **settings).prepare(problem, 1).run(problem, 0.5 * (problem.lower + problem.upper))
+    print(name, outcome.evaluations.f, outcome.objective.hex(), [value.hex() for value in outcome.x.tolist()])
+"""
 
 
-def test_a_problem_without_a_maker_is_refused_by_name() -> None:
-    walk = nlp_gait.load("walk12")
-    for problem in (toy(corner), walk.derive(title="other mathematics under the same name")):
-        for given in (problem, nlp_gait.compile_objective(problem)):
-            with pytest.raises(
-                InputError, match=rf"problem '{problem.name}' cannot be pickled.*make it in the other process"
-            ):
-                pickle.dumps(given)
-
-
-def test_a_robot_or_code_that_changed_on_the_way_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "robot.json"
-    path.write_text('{"schema": 1, "name": "mine", "extends": "nao-v5"}')
-    text = pickle.dumps(nlp_gait.load("nao-ssp", robot=str(path)))
-    path.write_text('{"schema": 1, "name": "mine", "extends": "nao-v6"}')
-    with pytest.raises(InputError, match="file of its robot has changed"):
-        pickle.loads(text)
-    code = tmp_path / "own.py"
-    code.write_text(EXAMPLE.read_text())
-    text = pickle.dumps(nlp_gait.load(f"{code}:two_link", intervals=10))
-    code.write_text(EXAMPLE.read_text().replace("0.05", "0.06"))
-    with pytest.raises(InputError, match="has changed since the problem was pickled"):
-        pickle.loads(text)
+@pytest.mark.slow
+def test_every_solver_repeats_its_result_in_other_processes() -> None:
+    """One process has one thread and a fixed hash seed, this one all threads and any hash seed."""
+    one = subprocess.run(
+        [sys.executable, "-c", SOLVERS],
+        cwd=ROOT,
+        env={**os.environ, **dict.fromkeys(THREADS, "1"), "PYTHONPATH": str(ROOT), "PYTHONHASHSEED": "1"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
+    )
+    printed = io.StringIO()
+    with redirect_stdout(printed), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # as in a process of its own
+        exec(SOLVERS, {})  # noqa: S102
+    assert one.stdout.splitlines() == printed.getvalue().splitlines()
+    assert one.stdout.count("\n") >= 23

@@ -70,7 +70,8 @@ def test_export_writes_next_to_the_result_by_default(gait):
 
 def test_export_writes_a_film_and_a_page(gait):
     gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.3}}))
-    nlp_gait("export", gait, "--to", "gif")
+    for _ in range(2):  # its own file may be replaced
+        nlp_gait("export", gait, "--to", "gif")
     assert gait.with_suffix(".gif").stat().st_size > 5_000
     nlp_gait("export", gait, "--to", "html")
     assert "support polygon" in gait.with_suffix(".html").read_text()

@@ -28,6 +28,7 @@ from metaheuristics import ParticleSwarm, SearchError
 from metaheuristics.interface import Array, Start
 from nlp_gait.errors import GaitError, InputError
 
+EXAMPLE = Path(__file__).parents[3] / "examples" / "bring_your_own.py"
 SSP = ProblemSpec(name="nao-ssp")
 SMALL = StudySettings(
     problems=(ProblemSpec(name="walk12"),),
@@ -192,6 +193,10 @@ def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -
         (Task(problem=SSP, solver="ipopt", stop=Stop(time_limit_s=0.0)), "time_limit_s must be"),
         (Task(problem=SSP, solver="pso", label="../../etc"), "label has 1 to 64 letters"),
         (Task(problem=ProblemSpec(name="nao-spp"), solver="pso"), "unknown problem"),
+        (Task(problem=SSP, solver="pymoo:XYZ"), "unknown algorithm 'pymoo:XYZ'"),
+        (Task(problem=SSP, solver="none.py:A"), "cannot be read: No such file"),
+        (Task(problem=SSP, solver="nowhere_at_all:A"), "is installed; name a file as nowhere_at_all.py:A"),
+        (Task(problem=SSP, solver=f"{EXAMPLE}:Shrinkin"), "did you mean 'Shrinking'"),
     ],
 )
 def test_what_cannot_run_is_reported_before_the_work(task: Task, message: str, tmp_path: Path) -> None:

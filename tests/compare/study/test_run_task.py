@@ -14,7 +14,6 @@ from compare.study.run_study import Study, run_study
 from compare.study.run_task import try_task
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec, Stop, Task
-from nlp_gait.user_code import load_object
 from tests.compare.cli.calls import nlp_gait
 
 WALK = ProblemSpec(name="walk12")
@@ -61,7 +60,6 @@ WAYS: dict[str, tuple[str, str, str | None]] = {
     "nothing": ("ask", "return None", "ask: points must have shape"),
     "not a number": ("ask", "return np.full((2, 4), np.nan)", "outside the bounds"),
     "out of bounds": ("ask", "return self.s.upper[None] + 1", "outside the bounds"),
-    "never returns": ("tell", "time.sleep(10**6)", "did not return within 0.3 s after the time limit of 0.5 s"),
     "never returns at import": ("end", "time.sleep(10**6)", "did not return within"),
     "calls sys.exit": ("tell", "sys.exit('bye')", "failed: SystemExit: bye"),
     "ends its process": ("tell", "os._exit(7)", "its process ended without a result, by status 7"),
@@ -78,7 +76,6 @@ WAYS: dict[str, tuple[str, str, str | None]] = {
     "leaves a child": ("start", "os.fork() or time.sleep(10**6)", None),
 }
 ALL = "f, lower, upper, evaluations, seed"  # what a plain function takes
-ENDED = ("evaluation budget used", "time limit reached")
 
 
 def written(folder: Path, name: str, way: str) -> Path:
@@ -109,15 +106,15 @@ def test_many_hostile_plug_ins_leave_the_others_records_whole(
     assert len(read_records(tmp_path / "out")) == len(solvers)  # every file is read strictly
     (pso,) = [record for record in records if record.solver == "pso"]
     assert (pso.x, pso.verdict, pso.history) == (alone[0].x, alone[0].verdict, alone[0].history)
-    for record in records:
-        if record.solver in ways:
-            said = WAYS[ways[record.solver]][2]
-            if said is None:
-                assert record.claimed and record.status.startswith(ENDED), (ways[record.solver], record.status)
-            else:
-                assert not record.claimed and not record.verdict.feasible
-                assert pytest.approx(0) == record.time_s.solve
-                assert re.search(said, record.status), (ways[record.solver], record.status)
+    for record in (record for record in records if record.solver in ways):
+        said = WAYS[ways[record.solver]][2]
+        assert record.claimed == (said is None), (ways[record.solver], record.status)
+        assert record.claimed or (not record.verdict.feasible and record.time_s.solve == 0.0)
+        assert (
+            re.match("evaluation budget used|time limit reached", record.status)
+            if said is None
+            else re.search(said, record.status)
+        ), (ways[record.solver], record.status)
 
 
 @pytest.mark.slow
@@ -132,7 +129,11 @@ def test_a_study_with_workers_takes_them_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "body", "said"),
     [
-        (ALL, "while seed >= 0:\n  try: f(lower)\n  except BaseException: seed += 1", "did not return"),
+        (
+            ALL,
+            "while seed >= 0:\n  try: f(lower)\n  except BaseException: seed += 1",
+            r"return within 0.3 s after .* 0.5 s",
+        ),
         (ALL, "for _ in range(9999):\n  try: f(lower)\n  except BaseException: pass", "evaluation budget used"),
         (ALL, "return lower", "returned without any call of f"),
         (ALL, "f(lower[:2])", r"f takes one point of shape \(4,\)"),
@@ -143,7 +144,7 @@ def test_a_plain_function_is_stopped_at_its_budget_even_if_it_ignores_it(
     arguments: str, body: str, said: str, impatient: None, tmp_path: Path
 ) -> None:
     (tmp_path / "own.py").write_text(f"def search({arguments}):\n {body}\n")
-    stop = STOP if said == "did not return" else PATIENT
+    stop = STOP if "return within" in said else PATIENT
     record = try_task(Task(problem=WALK, solver=f"{tmp_path / 'own.py'}:search", stop=stop))
     assert re.search(said, record.status)
     assert record.claimed == (said == "evaluation budget used") and (
@@ -151,31 +152,12 @@ def test_a_plain_function_is_stopped_at_its_budget_even_if_it_ignores_it(
     )
 
 
-def test_missing_user_code_is_reported_before_the_work(tmp_path: Path) -> None:
-    file = written(tmp_path, "good", "raises in ask")
-    for name, words in (
-        (f"{tmp_path}/none.py:A", "cannot be read: No such file"),
-        (f"{file}:Algorithmus", "did you mean 'Algorithm'"),
-        ("nowhere_at_all:A", "no module 'nowhere_at_all' is installed; name a file as nowhere_at_all.py:A"),
-        ("pymoo:XYZ", "unknown algorithm 'pymoo:XYZ'"),
-    ):
-        done = nlp_gait("compare", "walk12", "--algorithms", name, "--out", tmp_path / "out", status=1)
-        assert words in done.stderr and not list(tmp_path.rglob("*.json"))
-
-
-def test_naming_is_what_runs_code(tmp_path: Path) -> None:
-    """A file of data that names code runs nothing; the same file runs once the code is named."""
-    mark = tmp_path / "it-ran"
-    own = tmp_path / "never_named.py"
-    own.write_text(f"from nlp_gait.formulation import load\nopen({str(mark)!r}, 'w').close()\nleg = load('walk12')\n")
-    walk = load_object(f"{own}:leg", "problem")
-    assert mark.exists()
-    mark.unlink()
-    result = tmp_path / "best.json"
-    x = dict(zip(walk.names, ((walk.lower + walk.upper) / 2).tolist(), strict=True))  # type: ignore[attr-defined]
+def test_a_file_that_names_code_runs_nothing(tmp_path: Path) -> None:
+    mark, own, result = tmp_path / "it-ran", tmp_path / "never_named.py", tmp_path / "best.json"
+    own.write_text(f"from nlp_gait import load\nopen({str(mark)!r}, 'w').close()\nleg = load('walk12')\n")
+    x = dict.fromkeys(WALK.load().names, 0.1)
     result.write_text(json.dumps({"problem": "other/never_named.py:leg", "x": x}))
     refused = nlp_gait("export", result, "--to", "csv", status=1).stderr
     assert "runs only if you name it: add --code other/never_named.py:leg" in refused and not mark.exists()
-    own.write_text(own.read_text() + "\n# another text\n")
     nlp_gait("export", result, "--to", "csv", "--code", f"{own}:leg")
     assert mark.exists()
