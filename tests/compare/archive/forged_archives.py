@@ -83,7 +83,7 @@ def damage(files: Files, record: str) -> Iterator[tuple[str, bytes, str]]:
             "outside" if "outside" in bad else "not allowed",
         )
     yield "two names that differ in case", write_zip({**files, record.upper(): b"x"}), "twice"
-    yield "a link", write_zip({**files, "link": b"/etc/passwd"}, _make_link), "plain files"
+    yield "a link", write_zip({**files, "link": b"/etc/passwd"}, _make_link), "plain file"
     yield "a folder", write_zip({**files, "folder/": b""}), "folder/"
     yield "a bomb", write_zip({**files, "bomb": b"0" * 30_000_000}), "too large"
 
