@@ -10,8 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, NamedTuple, TypeVar
 
-import numpy as np
-
 from compare.judge import evaluate
 from compare.study.origin import hash_installed_code
 from compare.study.record import RunRecord, Verdict, load_problem
@@ -19,10 +17,9 @@ from compare.study.record_files import read_each
 from compare.study.references import SAME_VALUE, find_reference
 from nlp_gait.backends.exact import ExactValues, build_exact_model
 from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
-from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.backends.solve import count_workers
 from nlp_gait.errors import GaitError, InputError, UserCodeError
-from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.interrupts import never
 from nlp_gait.processes import run_in_forks
@@ -30,8 +27,6 @@ from nlp_gait.processes import run_in_forks
 T = TypeVar("T")
 R = TypeVar("R")
 
-# Up to this many points of a problem are evaluated by CasADi, a third of a millisecond each; more by the compiled objective.
-MOST_INTERPRETED = 1000
 # A total violation of up to 1e-6 may improve the objective by up to this much, relatively.
 SLACK = 1e-4
 # Relative difference of the last value of a history from the judged one: exact for searches, lifted for NLP solvers, and rounded
@@ -75,9 +70,7 @@ class Context:
     problem: GaitProblem | None = None  #: None if it cannot be loaded
     needs_code: bool = False  #: that the command does not name
     objections: list[str] = field(default_factory=list)  #: to the problem or the point, which prevent an evaluation
-    objective: float | None = None  #: at its x, by the compiled functions or else as ``exact``; None if not evaluated
-    violation: float = math.nan  #: likewise
-    indexes: Mapping[str, float] | None = None  #: of the interpreted functions; None if the compiled ones agree
+    exact: ExactValues | None = None  #: at its x; None if not evaluated
     bound: float | None = None  #: proven: no feasible point has a better objective
     first: Mapping[str, RunRecord] = field(default_factory=dict)  #: with the same mark, see ``_list_marks``
     code: tuple[str, str] | None = None  #: hash of the code, and version of CasADi, of most records
@@ -204,24 +197,13 @@ def _list_marks(record: RunRecord) -> dict[str, tuple[object, ...]]:
 
 
 def _evaluate_points(problem: GaitProblem, pairs: Sequence[tuple[RunRecord, Context]]) -> None:
-    """Fill in objective, violation and indexes at the points of a problem."""
-    points: list[tuple[RunRecord, Context, Array]] = []
+    """Fill in the exact values at the points of a problem."""
+    model = build_exact_model(problem)
     for record, context in pairs:
         try:
-            points += [(record, context, problem.check_x(record.x))] if record.x else []
+            context.exact = model.at(problem.check_x(record.x), problem.p) if record.x else None
         except (GaitError, ValueError) as error:
             context.objections.append(f"its point does not belong to the problem: {error}")
-    sign = problem.objective.sign
-    if len(points) > MOST_INTERPRETED:
-        costs, violations = compile_objective(problem)(np.array([x for _, _, x in points]))
-        for (_, context, _), cost, violation in zip(points, costs.tolist(), violations.tolist(), strict=True):
-            context.objective, context.violation = sign * cost, math.inf if math.isnan(violation) else violation
-        points = [point for point in points if check_verdict(*point[:2])]
-    model = build_exact_model(problem)
-    for _, context, x in points:  # after compiled ones, those that the interpreted functions decide
-        exact: ExactValues = model.at(x, problem.p)
-        context.objective, context.indexes = sign * exact.cost, exact.indexes
-        context.violation = math.inf if math.isnan(exact.violation) else exact.violation
 
 
 def _choose_runs(
@@ -249,18 +231,19 @@ def check_problem(record: RunRecord, context: Context) -> str | None:
 
 def check_verdict(record: RunRecord, context: Context) -> str | None:
     """Compare the verdict with what is evaluated at x; a run without a point has none."""
-    verdict, indexes = record.verdict, context.indexes
+    verdict, exact = record.verdict, context.exact
     judged = verdict.feasible or math.isfinite(verdict.objective) or verdict.indexes or verdict.dense
     if not record.x:
         return "it has a verdict, but no point" if judged or verdict.guaranteed else None
-    if context.objective is None:
+    if exact is None:
         return None
-    pairs = {"objective": (verdict.objective, context.objective, 0.0)}
-    pairs["violation"] = verdict.violation, context.violation, 1.0
-    if indexes is not None and verdict.indexes:
-        if verdict.indexes.keys() != indexes.keys():
+    violation = math.inf if math.isnan(exact.violation) else exact.violation
+    pairs = {"objective": (verdict.objective, record.inputs.objective.sign * exact.cost, 0.0)}
+    pairs["violation"] = verdict.violation, violation, 1.0
+    if verdict.indexes:
+        if verdict.indexes.keys() != exact.indexes.keys():
             return "its indexes have other names than those of the problem"
-        pairs |= {f"index {name}": (verdict.indexes[name], value, 1.0) for name, value in indexes.items()}
+        pairs |= {f"index {name}": (verdict.indexes[name], value, 1.0) for name, value in exact.indexes.items()}
     differences = [
         f"its {name} is {stated:.9g}, but that of its x is {value:.9g}"
         for name, (stated, value, scale) in pairs.items()

@@ -84,7 +84,7 @@ def import_runs(
         verdict = Verdict.from_evaluation(evaluate(problem, x))
         for name, least in LEAST.items():
             table.number(name, k, row[name], least)
-        history, seconds = known.get(run, (History(evaluations=(), objective=()), ()))
+        history, seconds = known.get(run, (History(), ()))
         count = math.nan if evaluations is None else evaluations
         count = count if math.isnan(row["evaluations"]) else row["evaluations"]
         if run not in known and not math.isnan(count):
@@ -116,11 +116,8 @@ def import_runs(
                 claimed_violation=None if math.isnan(row["violation"]) else row["violation"],
                 verdict=verdict,
                 evaluations={"f": history.evaluations[-1]} if history.evaluations else {},
-                failed_evaluations=0,
-                iterations=0,
-                active_constraints=(),
                 history=history,
-                time_s=Times.make_unknown(next(solve, math.nan), seconds),
+                time_s=Times(solve=next(solve, math.nan), history=seconds),
             )
         )
     return records

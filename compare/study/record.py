@@ -9,7 +9,7 @@ import itertools
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +27,9 @@ from nlp_gait.notebook import format_html_table, import_pandas
 from nlp_gait.proofs.guarantee import Guarantee
 
 SCHEMA = 5
+OPTIONAL = {"origin", "finished"}  # fields that a file may lack
 REMEDY = "delete it to have the run repeated"
-CALLS = tuple(field.name for field in fields(Evaluations))
+CALLS = tuple(kind.name for kind in fields(Evaluations))
 JUDGED = ("objective", "violation", "feasible", "feasible_between_samples", "guaranteed")
 HEADER = (
     *("problem", "solver", "run", "seed", "claimed", "status", "claimed_objective", "claimed_violation"),
@@ -42,54 +43,35 @@ HEADER = (
 class History:
     """Best so far over a run."""
 
-    evaluations: tuple[int, ...]  #: calls of f so far
-    objective: tuple[float | None, ...]  #: in the problem's sense; None before the first feasible point
+    evaluations: tuple[int, ...] = ()  #: calls of f so far
+    objective: tuple[float | None, ...] = ()  #: in the problem's sense; None before the first feasible point
 
 
 @dataclass(frozen=True, kw_only=True)
 class Times:
-    """Wall times [s], the only difference between two equal runs."""
+    """Wall times [s], the only difference between two equal runs; NaN if unknown."""
 
-    build: float  #: of the symbolic problem and NLP; near 0 if the process had them already
-    compile: float  #: of the objective, or of derivatives and solver; likewise
-    solve: float
-    objective: float  #: share of ``solve`` in the objective; NaN if unknown
-    history: tuple[float, ...]  #: at each entry of the history, from the start of the solve
+    build: float = math.nan  #: of the symbolic problem and NLP; near 0 if the process had them already
+    compile: float = math.nan  #: of the objective, or of derivatives and solver; likewise
+    solve: float = math.nan
+    objective: float = math.nan  #: share of ``solve`` in the objective
+    history: tuple[float, ...] = ()  #: at each entry of the history, from the start of the solve
     finished: str = ""  #: date and time of the end of the run, UTC; empty if unknown
-
-    @classmethod
-    def make_unknown(cls, solve: float, history: tuple[float, ...]) -> Times:
-        """Return the times of a run of which only these are known."""
-        return cls(build=math.nan, compile=math.nan, solve=solve, objective=math.nan, history=history)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """The judge's verdict on the point of a run."""
+    """The judge's verdict on the point of a run; by default that on a run without a point."""
 
-    objective: float  #: exact value, in the problem's sense; NaN without a point
-    violation: float  #: exact total violation; infinite without a point
-    feasible: bool  #: at the problem's samples
-    indexes: Mapping[str, float]
-    dense: Mapping[str, float] | None  #: the same on the dense grid; None without one
-    dense_feasible: bool | None  #: whether all rows are satisfied on the dense grid; None without one
+    objective: float = math.nan  #: exact value, in the problem's sense
+    violation: float = math.inf  #: exact total violation
+    feasible: bool = False  #: at the problem's samples
+    indexes: Mapping[str, float] = field(default_factory=dict)
+    dense: Mapping[str, float] | None = None  #: the same on the dense grid; None without one
+    dense_feasible: bool | None = None  #: whether all rows are satisfied on the dense grid; None without one
     #: Names of the worst violated rows with their violation, those at the problem's samples first
-    violated: tuple[str, ...]
-    guaranteed: Guarantee | None  #: what is proven between the samples; None if the point is infeasible
-
-    @classmethod
-    def make_plain(cls, objective: float = math.nan, violation: float = math.inf, feasible: bool = False) -> Verdict:
-        """Return a verdict of values alone; by default that on a run without a point."""
-        return cls(
-            objective=objective,
-            violation=violation,
-            feasible=feasible,
-            indexes={},
-            dense=None,
-            dense_feasible=None,
-            violated=(),
-            guaranteed=None,
-        )
+    violated: tuple[str, ...] = ()
+    guaranteed: Guarantee | None = None  #: what is proven between the samples; None if the point is infeasible
 
     @classmethod
     def from_evaluation(cls, evaluation: Evaluation) -> Verdict:
@@ -115,26 +97,26 @@ class RunRecord:
     solver: str  #: label, or name without one
     run: int  #: number within the study
     inputs: Inputs  #: everything that the result depends on
-    settings: Mapping[str, Any]  #: of the solver, defaults included
-    status: str  #: why the run ended, in words
-    claimed: bool  #: whether the solver claims a feasible result
-    x: Mapping[str, float]  #: by variable name; empty without a point
-    claimed_objective: float | None  #: in the problem's sense; None without a claim
-    claimed_violation: float | None  #: total; None without a claim
-    verdict: Verdict  #: what the judge finds at x
+    status: str = ""  #: why the run ended, in words
+    settings: Mapping[str, Any] = field(default_factory=dict)  #: of the solver, defaults included
+    claimed: bool = False  #: whether the solver claims a feasible result
+    x: Mapping[str, float] = field(default_factory=dict)  #: by variable name; empty without a point
+    claimed_objective: float | None = None  #: in the problem's sense; None without a claim
+    claimed_violation: float | None = None  #: total; None without a claim
+    verdict: Verdict = Verdict()  #: what the judge finds at x
     #: Calls by kind: f (with all constraints), g, gradient, jacobian, hessian; empty for an imported result without counts
-    evaluations: Mapping[str, int]
-    failed_evaluations: int  #: calls that returned NaN or infinity
-    iterations: int  #: generations of a population, iterations of an NLP solver
+    evaluations: Mapping[str, int] = field(default_factory=dict)
+    failed_evaluations: int = 0  #: calls that returned NaN or infinity
+    iterations: int = 0  #: generations of a population, iterations of an NLP solver
     #: Bounds with a price, largest first, from solvers with multipliers
-    active_constraints: tuple[ActiveConstraint, ...]
-    history: History
-    time_s: Times
+    active_constraints: tuple[ActiveConstraint, ...] = ()
+    history: History = History()
+    time_s: Times = Times()
     origin: Origin | None = None  #: of this run; None for imported results
 
     @classmethod
     def from_task(cls, task: Task, *, time_s: Times, **results: Any) -> RunRecord:
-        """Return the record of a task with the results of its run, which ends now: the fields from ``settings`` on."""
+        """Return the record of a task with the results of its run, which ends now: the fields from ``status`` on."""
         return cls(
             problem=task.problem.title,
             solver=task.title,
@@ -148,22 +130,8 @@ class RunRecord:
     @classmethod
     def make_failed(cls, task: Task, reason: str) -> RunRecord:
         """Return the record of a run without a result."""
-        return cls.from_task(
-            task,
-            settings={},
-            status=f"failed: {reason}",
-            claimed=False,
-            x={},
-            claimed_objective=None,
-            claimed_violation=None,
-            verdict=Verdict.make_plain(),
-            evaluations={"f": 0},
-            failed_evaluations=0,
-            iterations=0,
-            active_constraints=(),
-            history=History(evaluations=(), objective=()),
-            time_s=Times(build=0.0, compile=0.0, solve=0.0, objective=0.0, history=()),
-        )
+        times = Times(build=0.0, compile=0.0, solve=0.0, objective=0.0)
+        return cls.from_task(task, status=f"failed: {reason}", evaluations={"f": 0}, time_s=times)
 
     @property
     def seed(self) -> int:
@@ -211,8 +179,10 @@ def parse_record(raw: Any) -> RunRecord:
     if math.isnan(record.verdict.violation):
         record = replace(record, verdict=replace(record.verdict, violation=math.inf))
     decode(StoredProblem, record.inputs.problem, "inputs.problem")
-    if json.loads(json.dumps(replace_nan(record.inputs))) != raw["inputs"]:
-        raise ValueError("inputs must have every field, defaults too")  # a default would be another run's
+    plain = json.loads(json.dumps(replace_nan(record)))
+    places = [(plain, raw), *((plain[name], raw.get(name, {})) for name in ("verdict", "history", "time_s"))]
+    if plain["inputs"] != raw["inputs"] or any(whole.keys() - stored.keys() - OPTIONAL for whole, stored in places):
+        raise ValueError("it must have every field, defaults too")  # a default would be another run's
     for text in (record.inputs.objective.name, record.inputs.objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
             raise ValueError(f"{text!r} is not a name or unit of an objective")

@@ -155,7 +155,7 @@ class _Counter:
             return RunRecord.make_failed(task, "its process sent a result, but no point to evaluate")
         history, counts = record.history(), (record.evaluations, record.failed, record.generations)
         times = replace(claim.time_s, solve=record.elapsed_s, objective=record.objective_time_s)
-        own = replace(RunRecord.make_failed(task, ""), settings=claim.settings, status=claim.status, time_s=times)
+        own = RunRecord.from_task(task, settings=claim.settings, status=claim.status, time_s=times)
         listed = {*claim.history.evaluations, record.evaluations}
         return _judge_search(own, self._problem, record.best_x, record.best, counts, history, listed)
 
@@ -181,14 +181,10 @@ def _search(task: Task, callback: Callable[..., None] | None) -> RunRecord:
             callback=callback,
         )
     times = Times(
-        build=built - started,
-        compile=compiled - built,
-        solve=result.time_s,
-        objective=result.objective_time_s,
-        history=(),
+        build=built - started, compile=compiled - built, solve=result.time_s, objective=result.objective_time_s
     )
     settings = {**describe_settings(result.algorithm), "handling": describe_settings(result.handling)}
-    record = replace(RunRecord.make_failed(task, ""), settings=settings, status="; ".join(result.reasons), time_s=times)
+    record = RunRecord.from_task(task, settings=settings, status="; ".join(result.reasons), time_s=times)
     counts = result.evaluations, result.failed_evaluations, result.generations
     return _judge_search(record, problem, result.x, (result.violation, result.objective), counts, result.history)
 

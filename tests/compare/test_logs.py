@@ -10,7 +10,7 @@ import pytest
 
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.bench.baseline import get_reference, load_baseline
-from compare.logs import NOTHING_FEASIBLE, SMALLEST, make_traces, write_ioh
+from compare.logs import NOTHING_FEASIBLE, SMALLEST, trace_gaps, write_ioh
 
 INSTANCES = ("walk12-w015", "ssp-v5")
 
@@ -29,11 +29,11 @@ def comparisons() -> list[Comparison]:
 
 def test_a_trace_begins_at_one_evaluation_and_improves(comparisons: list[Comparison]) -> None:
     for solver in comparisons[-1].solvers:
-        for trace in make_traces(solver):
-            assert trace.lines[0] == (1, NOTHING_FEASIBLE) or trace.lines[0][0] == 1
-            evaluations, gaps = zip(*trace.lines, strict=True)
+        for curve in solver.curves:
+            evaluations, gaps = zip(*trace_gaps(curve).items(), strict=True)
+            assert evaluations[0] == 1 and gaps[0] <= NOTHING_FEASIBLE
             assert list(evaluations) == sorted(set(evaluations)) and list(gaps) == sorted(set(gaps), reverse=True)
-            assert min(gaps) >= SMALLEST and evaluations[-1] <= trace.total
+            assert min(gaps) >= SMALLEST and evaluations[-1] <= max(1, curve.total_cost())
 
 
 def test_runs_are_numbered_from_one_and_gaps_are_minimised(comparisons: list[Comparison], tmp_path: Path) -> None:

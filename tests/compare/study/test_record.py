@@ -54,7 +54,7 @@ def hostile_results(record: RunRecord, seed: int) -> Iterator[Callable[[], RunRe
         yield change(evaluations={"f": value})
         yield change(history=History(evaluations=(1,) * 2, objective=(1.0, value)), time_s=times(2))
         yield change(history=History(evaluations=(1, draw.choice(values)), objective=(1.0, 1.0)), time_s=times(2))
-        yield change(time_s=Times.make_unknown(draw.choice(values), record.time_s.history))
+        yield change(time_s=Times(solve=draw.choice(values), history=record.time_s.history))
         yield lambda value=value: fail(RuntimeError(value))
         yield lambda value=value: fail(type("Stop", (BaseException,), {"__str__": lambda self: value})())
     yield lambda: fail(type("Mute", (Exception,), {"__str__": lambda self: 1 / 0})())
@@ -62,7 +62,7 @@ def hostile_results(record: RunRecord, seed: int) -> Iterator[Callable[[], RunRe
 
 
 def times(entries: int) -> Times:
-    return Times.make_unknown(1.0, (0.5,) * entries)
+    return Times(solve=1.0, history=(0.5,) * entries)
 
 
 def fail(error: BaseException) -> RunRecord:
