@@ -12,7 +12,7 @@ from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.record_statistics import Curve
 from nlp_gait.files import make_file_name, make_writable_folder, write_json, write_text
 
-__all__ = ["NOTHING_FEASIBLE", "trace_gaps", "write_ioh"]
+__all__ = ["NOTHING_FEASIBLE", "list_gaps", "write_ioh"]
 
 # Gap before the first feasible point: formats of unconstrained benchmarks have no value for it.
 NOTHING_FEASIBLE = 1e10
@@ -35,7 +35,7 @@ def write_ioh(comparisons: Sequence[Comparison], folder: Path) -> list[Path]:
     ]
 
 
-def trace_gaps(curve: Curve) -> dict[int, float]:
+def list_gaps(curve: Curve) -> dict[int, float]:
     """Return the gap by evaluations each time the best improves; the first is at one evaluation, as readers expect."""
     gaps = {1: NOTHING_FEASIBLE}
     for evaluations, gap in zip(curve.evaluations.tolist(), curve.gap.tolist(), strict=True):
@@ -50,7 +50,7 @@ def _write_log(folder: Path, number: int, comparison: Comparison, solver: Solver
     data = Path(f"data_{stem}") / f"IOHprofiler_f{number}_DIM{dimension}.dat"
     lines, runs = ["evaluations raw_y"], []
     for record, curve in zip(solver.records, solver.curves, strict=True):
-        gaps = trace_gaps(curve)
+        gaps = list_gaps(curve)
         lines += [f"{count} {gap!r}" for count, gap in gaps.items()]
         last = max(gaps)
         best = {"evals": last, "y": gaps[last], "x": list(record.x.values())}

@@ -34,11 +34,8 @@ from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.proofs.certificate import check_certificate, load_certificates, read_certificate
 from nlp_gait.user_code import hash_file, is_user_code, parse_reference, resolve_code
 
-# What a repeated run must have in common with its record: everything but the times.
-REPEATED = (
-    *("settings", "status", "claimed", "x", "claimed_objective", "claimed_violation", "verdict", "evaluations"),
-    *("failed_evaluations", "iterations", "active_constraints", "history"),
-)
+# Fields in which a repeated run may differ from its record.
+NOT_REPEATED = ("problem", "solver", "run", "inputs", "time_s", "origin")
 # By default one run of each solver and problem is repeated, and further ones for so long [s].
 FURTHER_S = 2.0
 MOST_CERTIFICATES = 20  # whose proofs are followed in one call
@@ -339,7 +336,7 @@ def _repeat_run(record: RunRecord, moved: RunRecord) -> str:
     """Repeat a run, whose files may have moved: the same seed gives the same bits."""
     again = try_task(_make_task(record, moved.inputs))
     recorded, found = record.to_json(), again.to_json()
-    for what in REPEATED:
+    for what in (name for name in recorded if name not in NOT_REPEATED):
         before, now = (json.dumps(plain[what], sort_keys=True) for plain in (recorded, found))
         if before != now:
             text = f"its {what.replace('_', ' ')} differs: recorded {before:.100}, found {now:.100}"

@@ -8,11 +8,10 @@ import lzma
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from compare.analysis.best_known import is_zero
 from compare.analysis.record_statistics import ECDF_TARGETS
@@ -75,8 +74,7 @@ def make_bench_study(
     return StudySettings(problems=problems, solvers=solvers, runs=runs, starts=runs, stop=Stop(evaluations=evaluations))
 
 
-@dataclass(frozen=True, kw_only=True)
-class BaselineRun:
+class BaselineRun(NamedTuple):
     """One run of the baseline."""
 
     instance: str
@@ -94,15 +92,8 @@ def load_table(path: Path = TABLE) -> Mapping[str, tuple[BaselineRun, ...]]:
     rows: dict[str, list[BaselineRun]] = {}
     with lzma.open(path, "rt", encoding="utf-8", newline="") as file:
         for instance, solver, run, objective, in_history, evaluations, times in csv.reader(file):
-            row = BaselineRun(
-                instance=instance,
-                solver=solver,
-                run=int(run),
-                objective=float(objective),
-                in_history=in_history == "1",
-                evaluations=int(evaluations),
-                times=tuple(map(int, times.split())),
-            )
+            costs = int(evaluations), tuple(map(int, times.split()))
+            row = BaselineRun(instance, solver, int(run), float(objective), in_history == "1", *costs)
             rows.setdefault(instance, []).append(row)
     return {instance: tuple(group) for instance, group in rows.items()}
 

@@ -51,12 +51,8 @@ class Leaderboard:
 
 def rank_solvers(instances: Sequence[str], records: Sequence[RunRecord] = (), *, shipped: bool = True) -> Leaderboard:
     """Rank the solvers of records, and of the baseline if ``shipped``; raises InputError for an instance without baseline."""
-    everything = [
-        record
-        for id in instances
-        for record in (*(load_baseline(id) if shipped else ()), *records)
-        if record.problem == id
-    ]
+    baseline = [record for id in instances for record in load_baseline(id)] if shipped else []
+    everything = [*baseline, *(record for id in instances for record in records if record.problem == id)]
     references = {id: get_reference(id) for id in instances} if shipped else {}
     comparisons = tuple(compare_problems(everything, references=references))
     return Leaderboard(comparisons=comparisons, standings=tuple(_make_standings(comparisons)))
@@ -71,29 +67,22 @@ def _make_standings(comparisons: Sequence[Comparison]) -> list[Standing]:
     rows = rows[np.isfinite(rows).any(axis=1)]
     equal = (len(names) + 1) / 2  # where no solver reaches a target
     ranks = rankdata(rows, axis=1).mean(axis=0) if len(rows) else np.full(len(names), equal)
-    solved = [
-        float(
-            np.mean(
-                [math.isfinite(c.cost_to_reach(t)) for on in indexes for c in on[name].curves for t in ECDF_TARGETS]
-            )
-        )
-        for name in names
-    ]
+    curves = [[curve for on in indexes for curve in on[name].curves] for name in names]
+    hits = [[math.isfinite(c.cost_to_reach(t)) for c in of_solver for t in ECDF_TARGETS] for of_solver in curves]
+    solved = [float(np.mean(of_solver)) for of_solver in hits]
     places = rankdata([-share for share in solved], method="min")
-    return sorted(
-        (
-            Standing(
-                solver=name,
-                mean_rank=float(ranks[k]),
-                solved=solved[k],
-                solved_rank=int(places[k]),
-                feasible=float(np.mean([math.isfinite(cost) for on in indexes for cost in on[name].costs])),
-                reached=tuple(int(np.isfinite(costs[:, t, k]).sum()) for t in range(len(TARGETS))),
-            )
-            for k, name in enumerate(names)
-        ),
-        key=lambda standing: (standing.mean_rank, standing.solved_rank),
-    )
+    standings = [
+        Standing(
+            solver=name,
+            mean_rank=float(ranks[k]),
+            solved=solved[k],
+            solved_rank=int(places[k]),
+            feasible=float(np.mean([math.isfinite(cost) for on in indexes for cost in on[name].costs])),
+            reached=tuple(int(np.isfinite(costs[:, t, k]).sum()) for t in range(len(TARGETS))),
+        )
+        for k, name in enumerate(names)
+    ]
+    return sorted(standings, key=lambda standing: (standing.mean_rank, standing.solved_rank))
 
 
 def make_leaderboard_page(

@@ -7,15 +7,7 @@ from typing import Annotated, Literal
 from typer import Option
 
 from compare.bench.audit import INSTANCES, audit_search
-from compare.bench.baseline import (
-    BASELINE,
-    EVALUATIONS,
-    RUNS,
-    choose_instances,
-    list_baselines,
-    list_drawn,
-    make_bench_study,
-)
+from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, load_table, make_bench_study
 from compare.bench.leaderboard import make_leaderboard_page, make_verdict, rank_solvers
 from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
@@ -93,7 +85,7 @@ def bench(
 def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEffort) -> Output:
     """Run what the baseline lacks on the instances, rank all, and write the leaderboard."""
     instances = choose_instances(chosen.suite, chosen.instances, chosen.families, chosen.seeds)
-    shipped = effort.evaluations == EVALUATIONS and set(instances) <= {*list_baselines(), *list_drawn()}
+    shipped = effort.evaluations == EVALUATIONS and set(instances) <= load_table().keys()
     solvers = {} if shipped else {other: "" for other in parse_names(effort.against) if other != algorithm}
     if algorithm is not None:
         solvers[algorithm] = label or (f"my-{algorithm}" if algorithm in BASELINE else "")  # the last one

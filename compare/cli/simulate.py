@@ -206,11 +206,6 @@ def _watch(simulation: Run) -> tuple[list[Push], list[str]]:
         return [], [f"{error}; it was simulated without one"]
 
 
-def _describe_push(push: Push) -> str:
-    x, y = push.impulse_Ns
-    return f"Pushed at {push.start_s:.2f} s by {x:z.2f} N s forward and {y:z.2f} N s to the left"
-
-
 def _show_pictures(pictures: Iterator[Frame], count: int) -> Iterator[Frame]:
     with show_progress("frames", count) as advance:
         for picture in pictures:

@@ -21,6 +21,7 @@ from metaheuristics.registry import make_algorithm
 from nlp_gait.backends.identity import fingerprint, hash_json, identify_problem, make_key
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
+from nlp_gait.files import replace_nan
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaitbench.facts import SIX_DIGITS
@@ -89,18 +90,10 @@ class FoundCertainty:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data, without the ends of the starts."""
-        certificate = None if self.certificate is None else {**asdict(self.certificate), "gap": self.certificate.gap}
-        return {
-            **describe_problem(self.problem),
-            "starts": self.starts,
-            "statuses": self.statuses,
-            "optima": [asdict(optimum) for optimum in self.optima],
-            "largest_missed": self.largest_missed,
-            "search": None if self.search is None else asdict(self.search),
-            "certificate": certificate,
-            "proven": self.proven,
-            "supported": self.supported,
-        }
+        proof = None if self.certificate is None else {**asdict(self.certificate), "gap": self.certificate.gap}
+        plain = replace_nan({name: value for name, value in vars(self).items() if name != "problem"})
+        words = {"proven": self.proven, "supported": self.supported}
+        return {**describe_problem(self.problem), **plain, "certificate": proof, **words}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -77,14 +77,13 @@ def read_each(folder: Path) -> list[tuple[Path, RunRecord | InputError]]:
         paths.sort(key=lambda path: listed.get(path, 0))
     if not paths:
         raise InputError(f"{str(folder)!r} contains no records ({RECORDS}/<problem>/<solver>-<run>-<key>.json)")
-    return [(path, _read_or_error(path)) for path in paths]
-
-
-def _read_or_error(path: Path) -> RunRecord | InputError:
-    try:
-        return _read_checked(path)
-    except InputError as error:
-        return error
+    records: list[tuple[Path, RunRecord | InputError]] = []
+    for path in paths:
+        try:
+            records.append((path, _read_checked(path)))
+        except InputError as error:
+            records.append((path, error))
+    return records
 
 
 def _read_checked(path: Path) -> RunRecord:

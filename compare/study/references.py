@@ -65,7 +65,6 @@ def load_shipped() -> tuple[Shipped, ...]:
 
 @cache
 def _list_shipped() -> tuple[tuple[Shipped, Mapping[str, Any]], ...]:
-    """Return the shipped values with their problems as plain data."""
     return tuple((entry, asdict(entry.problem)) for entry in load_shipped())
 
 
@@ -109,12 +108,6 @@ def _find_generated(id: str, problem: Mapping[str, Any]) -> Reference | None:
     instance = import_object(FUNCTIONS["load_generated"])(id)
     if instance is None or describe_difference(problem, identify_problem(instance.gait_problem)):
         return None
-    return _make_generated_reference(id)
-
-
-@cache
-def _make_generated_reference(id: str) -> Reference:
-    instance = import_object(FUNCTIONS["load_generated"])(id)
     sign = instance.gait_problem.objective.sign
     source = f"generated with {instance.evidence}"
     return Reference(objective=sign * instance.best_known, x=tuple(instance.best_x.tolist()), source=source)

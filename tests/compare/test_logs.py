@@ -10,7 +10,7 @@ import pytest
 
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.bench.baseline import get_reference, load_baseline
-from compare.logs import NOTHING_FEASIBLE, SMALLEST, trace_gaps, write_ioh
+from compare.logs import NOTHING_FEASIBLE, SMALLEST, list_gaps, write_ioh
 
 INSTANCES = ("walk12-w015", "ssp-v5")
 
@@ -30,7 +30,7 @@ def comparisons() -> list[Comparison]:
 def test_a_trace_begins_at_one_evaluation_and_improves(comparisons: list[Comparison]) -> None:
     for solver in comparisons[-1].solvers:
         for curve in solver.curves:
-            evaluations, gaps = zip(*trace_gaps(curve).items(), strict=True)
+            evaluations, gaps = zip(*list_gaps(curve).items(), strict=True)
             assert evaluations[0] == 1 and gaps[0] <= NOTHING_FEASIBLE
             assert list(evaluations) == sorted(set(evaluations)) and list(gaps) == sorted(set(gaps), reverse=True)
             assert min(gaps) >= SMALLEST and evaluations[-1] <= max(1, curve.total_cost())
