@@ -6,11 +6,13 @@ import time
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, is_dataclass
+from functools import cache
 from typing import Any, ClassVar, Protocol
 
 import casadi as ca
 import numpy as np
 from casadi import MX
+from threadpoolctl import OpenBLASController, ThreadpoolController, register
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
@@ -89,6 +91,22 @@ def count_evaluations(stats: Mapping[str, Any]) -> Evaluations:
     )
 
 
+class CasadiBlas(OpenBLASController):
+    """The OpenBLAS that comes with CasADi and factorises for MUMPS; threadpoolctl does not know its name."""
+
+    internal_api = "casadi-openblas"
+    filename_prefixes = ("libcasadi-tp-openblas", "casadi-tp-openblas")
+
+
+register(CasadiBlas)
+
+
+@cache
+def limit_casadi_threads() -> None:
+    """Let CasADi's linear algebra use one thread: their number, which differs between processes, changes its rounding."""
+    ThreadpoolController().select(internal_api=CasadiBlas.internal_api).limit(limits=1)
+
+
 class IterationWatch(ca.Callback):
     """CasADi's ``iteration_callback``; it does not alter the iterations, and must live as long as its solver."""
 
@@ -102,6 +120,7 @@ class IterationWatch(ca.Callback):
 
     def begin(self, stop: Callable[[], bool], deadline: float) -> None:
         """Watch the next run of this thread, until ``stop`` returns True or a deadline of ``time.perf_counter`` [s]."""
+        limit_casadi_threads()
         self._of_thread.stop, self._of_thread.deadline, self._of_thread.reason = stop, deadline, ""
 
     @property
