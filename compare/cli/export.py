@@ -74,8 +74,8 @@ def _write_page(path: Path, result: Result, period_ms: int) -> None:
 
 def _write_film(path: Path, result: Result, period_ms: int) -> None:
     """Draw a gait as a stick figure with support polygon, zero-moment point and centre of mass."""
-    from compare.drawing.animation import draw_frames
     from compare.drawing.gait_figure import make_skeleton
+    from compare.drawing.poses import draw_frames
 
     check_video_path(path)
     skeleton = make_skeleton(result, FRAMES_PER_S)

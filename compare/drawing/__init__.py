@@ -3,4 +3,3 @@
 from pathlib import Path
 
 STYLE = Path(__file__).with_name("gait.mplstyle")
-PAPER_STYLE = Path(__file__).with_name("paper.mplstyle")

@@ -6,7 +6,6 @@ A figure is a function from a comparison to charts; ``compare.drawing.charts`` d
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,12 +14,8 @@ from compare.analysis.overview import Ranking
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS, compute_band, compute_ecdf, compute_profiles
 from compare.analysis.units import format_percent
 from compare.drawing.charts import Chart, Series
-from compare.drawing.figures import assign_looks, make_axes, use_style
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 GRID_POINTS = 120
 AXES = {"evaluations": "equivalent evaluations", "seconds": "seconds of the solve"}
@@ -154,33 +149,21 @@ def list_expected_costs(comparisons: Sequence[Comparison]) -> dict[str, list[flo
     return {name: [solvers[name].expected_cost(target) for solvers in by_name for target in TARGETS] for name in known}
 
 
-def plot_critical_difference(ranking: Ranking) -> Figure:
-    """Plot mean ranks on a line; a bar joins those that differ by less than the critical difference.
+def make_critical_difference_charts(ranking: Ranking) -> list[Chart]:
+    """Return mean ranks, one row per solver; a line reaches from each as far as the critical difference.
 
     Source:
         Demsar (2006), Statistical comparisons of classifiers over multiple data sets, section 3.2.4.
     """
-    names, ranks = list(ranking.mean_ranks), np.array([*ranking.mean_ranks.values()])
-    width = ranking.critical_difference or 0.0
-    ends = [int(np.searchsorted(ranks, rank + width, side="left")) - 1 for rank in ranks]
-    bars = [(first, last) for first, last in enumerate(ends) if last > first and last not in ends[:first]]
-    half = (len(names) + 1) // 2  # names to the left; the others are to the right, from below
-    with use_style():
-        figure, axes = make_axes(7.4, 0.9 + 0.14 * len(bars) + 0.2 * half)
-        for height, (first, last) in enumerate(bars, start=1):
-            axes.plot(ranks[[first, last]] + [-0.03, 0.03], [-0.5 * height] * 2, color="black", linewidth=3.0)
-        for place, (name, look) in enumerate(assign_looks(names).items()):
-            is_left = place < half
-            low = -0.5 * len(bars) - (place + 1 if is_left else len(names) - place)
-            edge = ranks[0] - 0.3 if is_left else ranks[-1] + 0.3
-            axes.plot([ranks[place], ranks[place], edge], [0.0, low, low], color=look.colour, linewidth=1.0)
-            axes.text(edge, low, f" {name} {ranks[place]:.2f} ", ha="right" if is_left else "left", va="center")
-        axes.xaxis.set_ticks_position("top")
-        axes.xaxis.set_label_position("top")
-        axes.set_xlabel(f"mean rank, critical difference {width:.2f}")
-        axes.set_ylim(-0.5 * len(bars) - half - 0.6, 0.0)
-        axes.set_xlim(ranks[0] - 0.25, ranks[-1] + 0.25)
-        axes.yaxis.set_visible(False)
-        axes.spines[["left", "right", "bottom"]].set_visible(False)
-        axes.grid(visible=False)
-    return figure
+    width, count = ranking.critical_difference or 0.0, len(ranking.mean_ranks)
+    series = []
+    for place, (name, rank) in enumerate(ranking.mean_ranks.items()):
+        height = np.full(2, float(count - place))
+        series.append(
+            Series(name=name, x=np.array([rank]), y=height[:1], shape="points", notes=[f"{name}: {rank:.2f}"])
+        )
+        series.append(Series(name=name, x=np.array([rank, rank + width]), y=height))
+    rows = [f"{name} {rank:.2f}" for name, rank in ranking.mean_ranks.items()]
+    return [
+        Chart(x=f"mean rank, critical difference {width:.2f}", y="", series=series, rows=rows, range=(0.4, count + 0.6))
+    ]

@@ -13,13 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from compare.drawing import PAPER_STYLE, STYLE
+from compare.drawing import STYLE
 from nlp_gait.files import replace_file, write_text
 from nlp_gait.interrupts import delay_interrupts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from compare.drawing.shapes import Drawing
 
 # One colour for each solver in every figure (Okabe and Ito); others get the remaining ones in order.
 COLOURS = {
@@ -65,7 +67,6 @@ def assign_looks(names: Collection[str]) -> dict[str, Look]:
     return {name: found[name] for name in names}
 
 
-_PRINTED: ContextVar[bool] = ContextVar("figures for a printed column", default=False)
 _STUDIED: ContextVar[frozenset[str]] = ContextVar("names of all solvers of the study", default=frozenset())
 
 
@@ -81,33 +82,21 @@ def share_looks(names: Collection[str]) -> Iterator[None]:
 
 @contextmanager
 def use_style() -> Iterator[None]:
-    """Use the project's matplotlib style within the context, and that of printed columns within ``use_paper_style``."""
+    """Use the project's Matplotlib style within the context."""
     import matplotlib
 
     with matplotlib.rc_context(fname=STYLE):
-        if _PRINTED.get():
-            matplotlib.rcParams.update(matplotlib.rc_params_from_file(PAPER_STYLE, use_default_template=False))
         yield
 
 
-@contextmanager
-def use_paper_style() -> Iterator[None]:
-    """Draw figures for a printed column within the context."""
-    token = _PRINTED.set(True)
-    try:
-        yield
-    finally:
-        _PRINTED.reset(token)
-
-
-def make_figure(width_in: float | None = 6.3, height_in: float = 3.0) -> Figure:
-    """Return an empty figure of a size [inch], of the style's size for a width of None; use inside ``style()``."""
+def make_figure(width_in: float = 6.3, height_in: float = 3.0) -> Figure:
+    """Return an empty figure of a size [inch]; use inside ``use_style()``."""
     from compare.drawing.notebook_figure import NotebookFigure
 
-    return NotebookFigure(figsize=None if width_in is None else (width_in, height_in))
+    return NotebookFigure(figsize=(width_in, height_in))
 
 
-def make_axes(width_in: float | None = 6.3, height_in: float = 3.0) -> tuple[Figure, Axes]:
+def make_axes(width_in: float, height_in: float = 3.0) -> tuple[Figure, Axes]:
     """Return an empty figure of a size [inch], see ``make_figure``, and its only axes."""
     figure = make_figure(width_in, height_in)
     return figure, figure.subplots()
@@ -122,24 +111,6 @@ def add_legend_below(figure: Figure, axes: Axes | None = None) -> None:
     columns = max(1, min(len(labels), int(letters / (max(map(len, labels)) + 8))))
     figure.set_figheight(figure.get_figheight() + LEGEND_ROW_IN * -(-len(labels) // columns))
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)
-
-
-def use_log_axes(axes: Axes, both: bool = False) -> None:
-    """Make the x axis, or both, logarithmic once something positive is drawn.
-
-    Powers of ten are plain text: parsing mathematics takes most of a figure's time.
-    """
-    from matplotlib.ticker import FuncFormatter, NullLocator
-
-    drawn = axes.dataLim  # its least positive values are infinite where nothing positive was drawn
-    for axis, positive in ((axes.xaxis, drawn.minposx), (axes.yaxis, drawn.minposy if both else math.inf)):
-        if math.isfinite(positive):
-            name = "x" if axis is axes.xaxis else "y"
-            if len(set(axis.get_data_interval())) == 1:  # one value has no range of its own
-                axes.set(**{f"{name}lim": (positive / 10.0, positive * 10.0)})
-            axes.set(**{f"{name}scale": "log"})
-            axis.set_major_formatter(FuncFormatter(lambda value, _: format_power_of_ten(value)))
-            axis.set_minor_locator(NullLocator())
 
 
 def format_power_of_ten(value: float) -> str:
@@ -162,10 +133,11 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     return save_figure(figure, stem.with_name(f"{stem.name}.png")), svg
 
 
-def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG or PDF in the current style and return the path; raises OutputError."""
+def save_figure(drawing: Figure | Drawing, path: Path) -> Path:
+    """Write a drawing as PNG or PDF and return the path; raises OutputError."""
     kind = path.suffix.removeprefix(".")
     metadata = {"CreationDate": None, "Creator": None, "Producer": None} if kind == "pdf" else None
+    figure = drawing if hasattr(drawing, "savefig") else drawing.to_figure()
     with use_style(), replace_file(path) as file, delay_interrupts():
         figure.savefig(file, format=kind, metadata=metadata)
     return path

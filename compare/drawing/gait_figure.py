@@ -8,25 +8,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.drawing.animation import COLOURS, GROUND, MARGIN
-from compare.drawing.charts import Chart, Series, add_legends, draw_chart
-from compare.drawing.figures import INK, Look, assign_looks, make_figure, use_style
-from compare.drawing.svg import draw_poses
+from compare.drawing.charts import HEIGHT, WIDTH, Chart, Series, add_legend, draw_chart
+from compare.drawing.figures import assign_looks
+from compare.drawing.poses import draw_poses
+from compare.drawing.shapes import Drawing, place_drawings
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result, sample_signals
-from nlp_gait.formulation.display import TRUNK, Skeleton
+from nlp_gait.formulation.display import Skeleton
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.signals import JOINT_UNITS
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PERIOD_S = 0.02  # between samples
-SIDES = COLOURS | {TRUNK: INK}  # the page's ink, light or dark
-POSES = 6
-FAINTEST = 0.25  # opacity of the first pose; the last one has 1
-WIDTH_IN, ROW_IN = 7.4, 2.1
 
 
 @lock_casadi
@@ -68,47 +63,28 @@ def prepare_gait(result: Result) -> GaitCurves:
 
 def plot_gait(problem: GaitProblem, x: Array | Mapping[str, float], name: str) -> Figure:
     """Plot one gait, a point x of a problem, under the name of its solver; raises as ``prepare_gait``."""
-    return plot_gaits({name: prepare_gait(Result(problem=problem, x=problem.check_x(x)))})
+    return draw_gaits({name: prepare_gait(Result(problem=problem, x=problem.check_x(x)))}).to_figure()
 
 
-def plot_gaits(gaits: Mapping[str, GaitCurves], *, curves: bool = True) -> Figure:
-    """Plot the first gait from the side with the second one laid over it, and the curves of all.
+def draw_gaits(gaits: Mapping[str, GaitCurves], *, curves: bool = True) -> Drawing:
+    """Draw the first gait from the side with the second one laid over it, and the curves of all.
 
     Raises:
         InputError: there is nothing to draw.
     """
     charts = make_gait_charts(gaits) if curves else []
     (name, first), *others = gaits.items()
-    count = (first.skeleton is not None) + len(charts)
-    if not count:
+    if first.skeleton is None and not charts:
         raise InputError("these gaits have neither a skeleton nor torques: there is nothing to draw")
-    columns = 2 if len(gaits) > 1 and count > 2 else count
-    rows = -(-count // columns)
-    with use_style():
-        figure = make_figure(WIDTH_IN, ROW_IN * rows) if charts else make_figure(WIDTH_IN / 2, 1.5 * ROW_IN)
-        axes = list(figure.subplots(rows, columns, squeeze=False).flat)
-        if first.skeleton is not None:
-            _draw_poses(axes[0], first.skeleton, name)
-            if others and others[0][1].skeleton is not None:
-                _overlay_poses(axes[0], others[0][1].skeleton, assign_looks(list(gaits))[others[0][0]])
-                axes[0].set_title(f"{name}, and {others[0][0]} dashed", fontsize=8)
-        for axis, chart in zip(axes[count - len(charts) : count], charts, strict=True):
-            draw_chart(axis, chart)
-        for empty in axes[count:]:
-            empty.set_axis_off()
-        add_legends(figure, axes[count - len(charts) : count], charts)
-    return figure
-
-
-def draw_first_poses(gaits: Mapping[str, GaitCurves]) -> str:
-    """Return the first gait from the side with the second one laid over it as SVG; InputError if there is nothing to draw."""
-    (name, first), *others = gaits.items()
-    if first.skeleton is None:
-        raise InputError("this gait has no skeleton to draw")
-    over = None
+    count = (first.skeleton is not None) + len(charts)
+    columns = 2 if count == 4 else count
+    panels, over = [], None
     if others and others[0][1].skeleton is not None:
         over = (others[0][0], others[0][1].skeleton, assign_looks(list(gaits))[others[0][0]])
-    return draw_poses(name, first.skeleton, over, POSES)
+    if first.skeleton is not None:
+        panels.append(draw_poses(name, first.skeleton, WIDTH / max(columns, 2), HEIGHT, over))
+    drawing = place_drawings([*panels, *(draw_chart(chart, WIDTH / columns, HEIGHT) for chart in charts)], columns)
+    return add_legend(drawing, charts) if charts else drawing
 
 
 def make_gait_charts(gaits: Mapping[str, GaitCurves]) -> list[Chart]:
@@ -139,28 +115,3 @@ def measure_deviation(gait: Skeleton, reference: Skeleton) -> Array:
     weight = (index - low)[:, None, None]
     expected = (1.0 - weight) * planned[low] + weight * planned[low + 1]
     return 1000.0 * np.linalg.norm(drawn - expected, axis=2).max(axis=1)
-
-
-def _draw_poses(axes: Axes, skeleton: Skeleton, name: str) -> None:
-    """Draw poses at equidistant times over each other, later ones darker, from the side."""
-    axes.plot(skeleton.ground[:, 0], skeleton.ground[:, 1], color=GROUND, lw=1.0)
-    chosen = np.unique(np.linspace(0, len(skeleton.t) - 1, POSES).round().astype(int)).tolist()
-    for k, opacity in zip(chosen, np.linspace(FAINTEST, 1.0, len(chosen)).tolist(), strict=True):
-        for limb in skeleton.limbs:
-            axes.plot(*limb.points[k][:, (0, 2)].T, color=SIDES[limb.side], alpha=opacity, lw=1.0)
-        for sole in skeleton.soles:
-            axes.plot(*sole.corners[k][:, (0, 2)].T, color=SIDES[sole.side], alpha=opacity, lw=1.6)
-    low, high = skeleton.box()
-    axes.set_xlim(float(low[0]) - MARGIN, float(high[0]) + MARGIN)
-    axes.set_aspect("equal")
-    axes.grid(visible=False)
-    axes.tick_params(labelsize=6)
-    axes.set_xlabel("x [m]", fontsize=7)
-    axes.set_title(name, fontsize=8)
-
-
-def _overlay_poses(axes: Axes, skeleton: Skeleton, look: Look) -> None:
-    """Draw the first, middle and last pose, dashed in the colour of the solver."""
-    for k in (0, len(skeleton.t) // 2, -1):
-        for limb in skeleton.limbs:
-            axes.plot(*limb.points[k][:, (0, 2)].T, color=look.colour, linestyle="--", lw=0.8)

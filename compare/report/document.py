@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 from compare.analysis.units import format_number
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
+    from matplotlib.figure import Figure as Plot
+
+    from compare.drawing.shapes import Drawing
 
 Value = str | float | int | bool | None
 """Content of a cell; None for an empty one."""
@@ -55,16 +57,15 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Figure:
-    """A drawing, the stem of its SVG file, and its caption."""
+    """A drawing of shapes or of Matplotlib, the stem of its SVG file, and its caption."""
 
     name: str
     caption: str
-    drawing: Drawing | Callable[[], Drawing]  #: or the function that draws it
-    svg: Callable[[], str] | None = None  #: writes it without Matplotlib; None if only Matplotlib can
+    drawing: Drawing | Plot | Callable[[], Drawing | Plot]  #: or the function that draws it
     #: From which the page draws an interactive figure, if its scripts have an entry for ``kind``; else the drawing stays
     data: Mapping[str, Any] | None = None
 
-    def draw(self) -> Drawing:
+    def draw(self) -> Drawing | Plot:
         """Return the drawing."""
         return self.drawing() if callable(self.drawing) else self.drawing
 

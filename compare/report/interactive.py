@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from compare.drawing.charts import round_digits
-from compare.drawing.figures import assign_looks, render_svg
-from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
+from compare.drawing.figures import assign_looks
+from compare.drawing.gait_figure import GaitCurves, draw_gaits, prepare_gait
 from compare.report.document import Document, Figure
 from compare.report.writing import render_page
 from nlp_gait.errors import InputError
@@ -97,6 +97,6 @@ def _make_page(title: str, name: str, gait: GaitCurves) -> GaitPage:
     data = describe_gaits({name: gait}, MOST_SIMULATED)
     if data is None:
         raise InputError(f"{title}: this problem has no skeleton to draw")
-    drawing = plot_gaits({name: gait})
+    drawing = draw_gaits({name: gait})
     figure = Figure(name="gait", caption=CAPTION, drawing=drawing, data=data)
-    return GaitPage(render_page(Document(title=title, parts=[figure]), [render_svg(drawing)]))
+    return GaitPage(render_page(Document(title=title, parts=[figure]), [drawing.to_svg()]))

@@ -5,10 +5,9 @@ from functools import partial
 
 from compare.analysis.columns import MAIN, Column, format_rows
 from compare.analysis.comparison import Comparison
-from compare.drawing.charts import Chart, encode_charts, plot_charts
+from compare.drawing.charts import Chart, draw_charts, encode_charts
 from compare.drawing.comparison_figures import make_convergence_charts, make_ecdf_charts, make_final_gap_charts
-from compare.drawing.gait_figure import GaitCurves, draw_first_poses, plot_gaits, prepare_gait
-from compare.drawing.svg import draw_charts
+from compare.drawing.gait_figure import GaitCurves, draw_gaits, prepare_gait
 from compare.report.document import Figure, Part, Section, Table, make_text_table
 from compare.report.interactive import describe_gaits
 from compare.study.record import load_gait
@@ -40,8 +39,7 @@ def make_problem_section(comparison: Comparison, gaits: Mapping[str, GaitCurves]
             Figure(
                 name=f"{make_file_name(comparison.problem)}-gaits",
                 caption="Best gait.",
-                drawing=partial(plot_gaits, gaits, curves=False),
-                svg=partial(draw_first_poses, gaits),
+                drawing=partial(draw_gaits, gaits, curves=False),
                 data=describe_gaits(gaits, curves=False),
             )
         )
@@ -61,9 +59,8 @@ def make_chart_figure(name: str, caption: str, charts: Sequence[Chart], columns:
     return Figure(
         name=name,
         caption=caption,
-        drawing=partial(plot_charts, charts, columns),
+        drawing=partial(draw_charts, charts, columns),
         data=encode_charts(charts),
-        svg=partial(draw_charts, charts, columns),
     )
 
 

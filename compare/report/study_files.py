@@ -6,8 +6,9 @@ from pathlib import Path
 
 from compare.analysis.comparison import Comparison
 from compare.analysis.record_statistics import TARGETS
-from compare.drawing.charts import plot_charts
-from compare.drawing.figures import save_figure, use_paper_style
+from compare.drawing.charts import draw_charts
+from compare.drawing.figures import save_figure
+from compare.drawing.shapes import COLUMN
 from compare.report.document import Document, Figure, iterate_leaves
 from compare.report.latex import describe_run_counts, escape_latex, format_latex_overview, format_latex_table
 from compare.report.problem_section import FIGURES
@@ -39,8 +40,9 @@ class FurtherFiles:
             for name, rows in tables.items():
                 written.append(write_text(folder / f"{name}.csv", format_csv(replace_nan(rows))))
         if self.figures:
-            drawn = [part for part in iterate_leaves(document.parts) if isinstance(part, Figure)]
-            written += [save_figure(figure.draw(), folder / f"{figure.name}.png") for figure in drawn]
+            for part in iterate_leaves(document.parts):
+                if isinstance(part, Figure):
+                    written.append(save_figure(part.draw(), folder / f"{part.name}.png"))
         for comparison in comparisons:
             stem = folder / make_file_name(comparison.problem)
             if self.latex:
@@ -89,14 +91,13 @@ def _make_point_tables(comparisons: Sequence[Comparison]) -> dict[str, TableRows
 def _write_figures(stem: Path, comparison: Comparison) -> list[Path]:
     """Write ``<problem>-<figure>.pdf`` for each figure, and ``<problem>-figures.tex`` with their captions."""
     written, text = [], ""
-    with use_paper_style():
-        for name, (compute, caption) in FIGURES.items():
-            figure = f"{stem.name}-{name}"
-            drawing = plot_charts(compute(comparison), column=True)
-            written.append(save_figure(drawing, stem.with_name(f"{figure}.pdf")))
-            words = f"{caption.removesuffix('.')}; {comparison.problem}, {describe_run_counts(comparison)}."
-            text += (
-                f"\\begin{{figure}}\n\\centering\n\\includegraphics{{{figure}.pdf}}\n"
-                f"\\caption{{{escape_latex(words)}}}\n\\label{{fig:{figure}}}\n\\end{{figure}}\n"
-            )
+    for name, (compute, caption) in FIGURES.items():
+        figure = f"{stem.name}-{name}"
+        drawing = draw_charts(compute(comparison)[:1], width=COLUMN)
+        written.append(save_figure(drawing, stem.with_name(f"{figure}.pdf")))
+        words = f"{caption.removesuffix('.')}; {comparison.problem}, {describe_run_counts(comparison)}."
+        text += (
+            f"\\begin{{figure}}\n\\centering\n\\includegraphics{{{figure}.pdf}}\n"
+            f"\\caption{{{escape_latex(words)}}}\n\\label{{fig:{figure}}}\n\\end{{figure}}\n"
+        )
     return [*written, write_text(stem.with_name(f"{stem.name}-figures.tex"), text)]

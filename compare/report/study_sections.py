@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 
 from compare.analysis.columns import EFFORT, EVALUATIONS_TO, JUDGEMENT, SECONDS_TO
 from compare.analysis.comparison import Comparison
@@ -11,11 +10,11 @@ from compare.analysis.overview import Ranking, count_wins, describe_tests, list_
 from compare.analysis.units import BY_UNIT
 from compare.drawing.comparison_figures import (
     list_expected_costs,
+    make_critical_difference_charts,
     make_profile_charts,
-    plot_critical_difference,
 )
 from compare.drawing.gait_figure import GaitCurves, make_gait_charts
-from compare.report.document import Figure, Part, Prose, Section, Table, make_table_section, make_text_table
+from compare.report.document import Part, Prose, Section, Table, make_table_section, make_text_table
 from compare.report.problem_section import make_chart_figure, make_figure, make_statistics_table
 from compare.report.provenance import TERMS, format_settings, make_solver_table
 from compare.report.writing import make_citation_section, make_session_section
@@ -211,10 +210,10 @@ def make_overview(comparisons: Sequence[Comparison]) -> Section:
         )
     if ranking.critical_difference is not None:
         parts.append(
-            Figure(
-                name="critical-difference",
-                caption=f"Mean ranks of the medians; a bar joins solvers that do not differ. {describe_tests(ranking)}",
-                drawing=partial(plot_critical_difference, ranking),
+            make_chart_figure(
+                "critical-difference",
+                f"Mean ranks of the medians; solvers whose points lie on one line do not differ. {describe_tests(ranking)}",
+                make_critical_difference_charts(ranking),
             )
         )
     return Section(title="All problems", parts=parts)

@@ -12,6 +12,7 @@ from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 from compare.drawing.figures import inline_svg, render_svg
+from compare.drawing.shapes import Drawing
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, iterate_leaves, make_text_table
 from compare.report.provenance import explain
 from compare.study.citations import cite_problems
@@ -37,7 +38,9 @@ def write_parts(folder: Path, parts: Sequence[Part]) -> list[Path]:
     files: list[Path] = []
     for part in iterate_leaves(parts):
         if isinstance(part, Figure):
-            files.append(write_text(folder / f"{part.name}.svg", part.svg() if part.svg else render_svg(part.draw())))
+            drawing = part.draw()
+            svg = drawing.to_svg() if isinstance(drawing, Drawing) else render_svg(drawing)
+            files.append(write_text(folder / f"{part.name}.svg", svg))
         elif isinstance(part, Table) and part.name:
             files.append(write_text(folder / f"{part.name}.csv", format_csv(part.csv_rows)))
     return files

@@ -170,7 +170,7 @@ def test_only_folders_may_be_left_to_the_file_system(
 # Modules that write without the functions of nlp_gait.files, into a temporary file of theirs or where nothing is kept.
 ALLOWED = (
     "files processes backends/kernel/library_cache export/formats simulation/video proofs/checkpoint archive/unpack "
-    "drawing/animation drawing/figures drawing/notebook_figure study/store"
+    "drawing/poses drawing/figures drawing/notebook_figure study/store"
 )
 WRITING = re.compile(
     r"\.(write_text|write_bytes|savefig|savez|savez_compressed|rename|mkdir|touch)\("

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from compare.drawing.animation import draw_frames
 from compare.drawing.gait_figure import make_skeleton
+from compare.drawing.poses import draw_frames
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Result, list_problems
 

@@ -157,14 +157,12 @@ def test_the_page_begins_with_the_answer_and_folds_the_rest(page: str, folder: P
     assert page.index("<table") < page.index("<details>") and page.count("<svg") == 3
 
 
-def test_a_figure_without_an_entry_in_the_scripts_stays_a_drawing(tmp_path: Path) -> None:
-    """Statistics over problems appear from five problems on; the diagram of mean ranks has no data."""
+def test_statistics_over_problems_appear_from_five_problems_on(tmp_path: Path) -> None:
     for count in (4, 5):
         records = [replace(r, problem=f"walk-{k}") for k in range(count) for r in study()]
         document = make_study_document(compare_problems(records), Manifest(settings=None, sessions=()))
         figures = {part.name: part for part in iterate_leaves(document.parts) if isinstance(part, Figure)}
         assert ("critical-difference" in figures) == ("performance-profile" in figures) == (count == 5)
-    assert figures["critical-difference"].data is None
 
 
 def test_session_is_shown(tables: Tables) -> None:
@@ -228,4 +226,4 @@ def test_a_statistic_and_a_figure_are_added_as_documented() -> None:
     exec("\n".join(blocks), names)
     assert names["header"][-1] == "spread [%]"
     assert [row[-1] for row in names["rows"]] == ["0.00", "19.40", "29.94"]
-    assert {line.get_label() for line in names["figure"].axes[0].lines} == {"newton", "swarm", "colony"}
+    assert {"newton", "swarm", "colony"} <= {text.get_text() for text in names["figure"].axes[0].texts}

@@ -1,0 +1,141 @@
+"""Drawings of lines and words in pixels: SVG for pages, in a hundredth of Matplotlib's time, and Matplotlib for PNG and PDF."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from html import escape
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from compare.drawing.figures import INK, make_figure, use_style
+from nlp_gait.formulation import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LETTER, LINE, FONT = 6.2, 18, 12  # width of a letter, height of a line of text, and of its letters [pixels]
+PIXELS_PER_INCH = 108
+POINTS = 72 / PIXELS_PER_INCH  # of a pixel
+COLUMN = 3.4 * PIXELS_PER_INCH  # width of a printed column
+ALIGNED = {"start": "left", "middle": "center", "end": "right"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stroke:
+    """Lines, or areas, of one look."""
+
+    lines: Sequence[Array]  #: (N, 2) each, x to the right and y down [pixels]
+    colour: str = INK
+    width: float = 1.0
+    dash: str = ""  #: lengths of dashes and of gaps
+    opacity: float = 1.0
+    filled: bool = False
+
+    def move(self, right: float, down: float) -> Stroke:
+        """Return the lines elsewhere."""
+        return replace(self, lines=[line + (right, down) for line in self.lines])
+
+    def to_svg(self) -> str:
+        """Return an element of an SVG file."""
+        path = "".join("M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in line.tolist()) for line in self.lines)
+        look = f'fill="{self.colour}" stroke="none"' if self.filled else f'fill="none" stroke="{self.colour}"'
+        width = "" if self.width == 1.0 or self.filled else f' stroke-width="{self.width:g}"'
+        dash = f' stroke-dasharray="{self.dash}"' if self.dash else ""
+        opacity = "" if self.opacity == 1.0 else f' opacity="{self.opacity:.2g}"'
+        return f'<path d="{path}" {look}{width}{dash}{opacity}/>'
+
+    def plot(self, axes: Axes) -> None:
+        """Plot into axes in pixels."""
+        from matplotlib.collections import LineCollection, PolyCollection
+
+        if self.filled:
+            areas = PolyCollection(self.lines, facecolors=self.colour, alpha=self.opacity, linewidths=0.0)
+            axes.add_collection(areas)
+            return
+        dash = (0, [float(length) / self.width for length in self.dash.split()]) if self.dash else "-"
+        width = self.width * POINTS
+        lines = LineCollection(self.lines, colors=self.colour, linewidths=width, linestyles=[dash], alpha=self.opacity)
+        axes.add_collection(lines)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Label:
+    """A line of text."""
+
+    x: float
+    y: float  #: of its base
+    text: str
+    anchor: Literal["start", "middle", "end"] = "middle"
+    upwards: bool = False
+
+    def move(self, right: float, down: float) -> Label:
+        """Return the text elsewhere."""
+        return replace(self, x=self.x + right, y=self.y + down)
+
+    def to_svg(self) -> str:
+        """Return an element of an SVG file."""
+        place = f'x="{self.x:.1f}" y="{self.y:.1f}"'
+        if self.upwards:
+            place = f'transform="translate({self.x:.1f} {self.y:.1f}) rotate(-90)"'
+        return f'<text {place} text-anchor="{self.anchor}">{escape(self.text)}</text>'
+
+    def plot(self, axes: Axes) -> None:
+        """Plot into axes in pixels."""
+        turned = {"rotation": 90, "rotation_mode": "anchor"} if self.upwards else {}
+        aligned = {"ha": ALIGNED[self.anchor], "va": "baseline", "parse_math": False, "fontsize": FONT * POINTS}
+        axes.text(self.x, self.y, self.text, **aligned, **turned)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drawing:
+    """Shapes, the first one at the bottom."""
+
+    width: float
+    height: float
+    shapes: Sequence[Stroke | Label]
+
+    def to_svg(self) -> str:
+        """Return an SVG file."""
+        view = f'xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width:g} {self.height:.0f}"'
+        body = "\n".join(shape.to_svg() for shape in self.shapes)
+        return f'<svg {view} font-family="sans-serif" font-size="{FONT}">\n{body}\n</svg>\n'
+
+    def to_figure(self) -> Figure:
+        """Return a Matplotlib figure."""
+        with use_style():
+            figure = make_figure(self.width / PIXELS_PER_INCH, self.height / PIXELS_PER_INCH)
+            figure.set_layout_engine("none")
+            axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, self.width), ylim=(self.height, 0.0))
+            axes.set_axis_off()
+            for shape in self.shapes:
+                shape.plot(axes)
+        return figure
+
+
+def place_drawings(drawings: Sequence[Drawing], columns: int) -> Drawing:
+    """Return drawings row by row in columns of the first one's size."""
+    width, height = drawings[0].width, max(drawing.height for drawing in drawings)
+    shapes = [
+        shape.move(width * (k % columns), height * (k // columns))
+        for k, drawing in enumerate(drawings)
+        for shape in drawing.shapes
+    ]
+    return Drawing(width=width * columns, height=height * -(-len(drawings) // columns), shapes=shapes)
+
+
+def make_marker(corners: int, radius: float, turn: float) -> Array:
+    """Return a regular polygon (corners + 1, 2) about zero, its first corner at an angle."""
+    angles = turn + 2.0 * np.pi / corners * np.arange(corners + 1)
+    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+# By the marker of a look.
+MARKERS = {
+    "o": make_marker(12, 3.0, 0.0),
+    "s": make_marker(4, 4.2, np.pi / 4.0),
+    "^": make_marker(3, 3.8, -np.pi / 2.0),
+    "D": make_marker(4, 3.6, 0.0),
+}
