@@ -194,3 +194,27 @@ def test_importing_a_package_costs_only_what_it_needs(package: str, unwanted: tu
     loaded = set(done.stdout.split())
     assert package in loaded
     assert not loaded & set(unwanted)
+
+
+# Modules that write without the functions of nlp_gait.files, into a temporary file of theirs or where nothing is kept.
+ALLOWED = (
+    "files processes backends/kernel/library_cache export/formats simulation/video proofs/checkpoint archive/unpack "
+    "drawing/poses drawing/figures drawing/notebook_figure study/store"
+)
+WRITING = re.compile(
+    r"\.(write_text|write_bytes|savefig|savez|savez_compressed|rename|mkdir|touch)\("
+    r"|\w\.replace\([^,()=]+\)"  # of a path; texts take two arguments
+    r"|\bopen\([^)\n]*[\"'][wax]"
+)
+
+
+def test_every_writer_goes_through_one_module() -> None:
+    modules = [
+        (ROOT / name, path)
+        for name in ("nlp_gait", "metaheuristics", "compare")
+        for path in (ROOT / name).rglob("*.py")
+    ]
+    writers = {
+        path.relative_to(root).as_posix()[:-3] for root, path in modules if WRITING.search(path.read_text("utf-8"))
+    }
+    assert writers <= set(ALLOWED.split())

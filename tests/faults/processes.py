@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import shutil
 import signal
 import subprocess
@@ -13,8 +12,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-from nlp_gait.backends.kernel.compiler import find_compiler
 
 ROOT = Path(__file__).parents[2]
 
@@ -52,14 +49,6 @@ def in_own_mounts(script: str, *arguments: str) -> subprocess.CompletedProcess[s
         text=True,
         timeout=120,
     )
-
-
-def quick_compiler(folder: Path) -> str:
-    """Write a compiler that does not optimise, for tests of caches, which compile into an empty one."""
-    path = folder / "quick_compiler.sh"
-    path.write_text(f'#!/bin/sh\nexec {shlex.join(find_compiler().command)} "$@" -O0\n', encoding="utf-8")
-    path.chmod(0o700)
-    return str(path)
 
 
 def fake_compiler(folder: Path, body: str) -> str:

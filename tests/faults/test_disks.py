@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import errno
 import os
-import re
 import resource
 import sys
 from collections.abc import Callable
-from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,12 +17,11 @@ from compare.study.record import read_record
 from compare.study.record_files import locate_record
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
-from nlp_gait import files
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.export.formats import write_npz
 from nlp_gait.formulation import Signals
 from tests.compare.cli.calls import nlp_gait
-from tests.faults.processes import ROOT, in_own_mounts
+from tests.faults.processes import in_own_mounts
 
 Finished = Callable[[Path], None]
 WALK = ProblemSpec(name="walk12")
@@ -144,48 +140,3 @@ def test_a_file_is_flushed_before_it_is_renamed_and_its_folder_after_that(
     journal = Journal(tmp_path, monkeypatch)
     write(tmp_path, journal.finished)
     assert journal.renames > 0
-
-
-@pytest.mark.parametrize("number", [errno.EINVAL, errno.EPERM, errno.EIO])
-def test_only_folders_may_be_left_to_the_file_system(
-    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """EINVAL is what some network file systems answer to a folder's flush; EIO is a broken disk."""
-
-    def fail(descriptor: int) -> None:
-        opened.append(descriptor)
-        raise OSError(number, "no flush")
-
-    opened: list[int] = []
-    monkeypatch.setattr(files.os, "fsync", fail)
-    (tmp_path / "file").touch()
-    for path in (tmp_path / "file", tmp_path):
-        with pytest.raises(OSError, match="no flush") if path != tmp_path or number == errno.EIO else nullcontext():
-            files.flush(path)
-    for descriptor in opened:
-        with pytest.raises(OSError, match="Bad file descriptor"):
-            os.fstat(descriptor)
-
-
-# Modules that write without the functions of nlp_gait.files, into a temporary file of theirs or where nothing is kept.
-ALLOWED = (
-    "files processes backends/kernel/library_cache export/formats simulation/video proofs/checkpoint archive/unpack "
-    "drawing/poses drawing/figures drawing/notebook_figure study/store"
-)
-WRITING = re.compile(
-    r"\.(write_text|write_bytes|savefig|savez|savez_compressed|rename|mkdir|touch)\("
-    r"|\w\.replace\([^,()=]+\)"  # of a path; texts take two arguments
-    r"|\bopen\([^)\n]*[\"'][wax]"
-)
-
-
-def test_every_writer_goes_through_one_module() -> None:
-    modules = [
-        (ROOT / name, path)
-        for name in ("nlp_gait", "metaheuristics", "compare")
-        for path in (ROOT / name).rglob("*.py")
-    ]
-    writers = {
-        path.relative_to(root).as_posix()[:-3] for root, path in modules if WRITING.search(path.read_text("utf-8"))
-    }
-    assert writers <= set(ALLOWED.split())

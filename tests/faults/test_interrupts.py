@@ -30,10 +30,6 @@ from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.backends.solvers.solver import IterationWatch
 from nlp_gait.interrupts import (
     Interrupted,
-    defer_interrupts,
-    exit_on_interrupt,
-    raise_interrupts,
-    remember_interrupts,
 )
 from tests.backends.toys import corner, toy
 from tests.compare.records import DSP_X
@@ -89,26 +85,6 @@ def test_solve_within_the_first_start_keeps_where_it_was(monkeypatch: pytest.Mon
     assert not solution.converged and solution.best.iterations == 3 and "was interrupted" in solution.status
     assert isinstance(caught.value, KeyboardInterrupt)
     assert str(pickle.loads(pickle.dumps(caught.value))) == "interrupted in start 1 of 2"
-
-
-def test_a_second_press_is_not_deferred() -> None:
-    with pytest.raises(KeyboardInterrupt), defer_interrupts() as pressed:
-        signal.raise_signal(signal.SIGINT)
-        assert pressed()
-        signal.raise_signal(signal.SIGINT)
-
-
-def test_an_ignored_interrupt_stays_ignored() -> None:
-    """As under nohup, and for what a shell runs in the background."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        with defer_interrupts() as pressed, remember_interrupts() as check:
-            signal.raise_signal(signal.SIGINT)
-            check()
-            assert not pressed()
-        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 KEPT = r"; the results are in .*"
@@ -227,19 +203,3 @@ def test_while_modules_are_imported(module: str) -> None:
     assert done.returncode == 130, done.stderr
     assert done.stderr.startswith("nlp-gait: interrupted") and done.stderr.count("\n") == 1
     assert done.stdout == ""
-
-
-def test_ctrl_c_ends_the_process_outside_of_a_command_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    ended: list[object] = []
-    monkeypatch.setattr(os, "_exit", ended.append)
-    monkeypatch.setattr(os, "write", lambda *what: ended.append(what))
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        exit_on_interrupt()
-        with pytest.raises(KeyboardInterrupt), raise_interrupts():
-            signal.raise_signal(signal.SIGINT)
-        assert ended == []
-        signal.raise_signal(signal.SIGINT)
-        assert ended == [(2, b"nlp-gait: interrupted\n"), 130]
-    finally:
-        signal.signal(signal.SIGINT, before)

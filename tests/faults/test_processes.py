@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import itertools
 import multiprocessing
 import os
@@ -10,17 +9,13 @@ import signal
 import subprocess
 import sys
 import time
-import warnings
 from dataclasses import dataclass, replace
-from functools import partial
 from multiprocessing.synchronize import Barrier
 from pathlib import Path
 
 import pytest
-from joblib.externals.loky import get_reusable_executor
 
 import nlp_gait
-from compare.__main__ import fix_environment
 from compare.study.record import RunRecord
 from compare.study.record_files import find_record, read_records, write_records
 from compare.study.run_study import Study, run_study
@@ -29,8 +24,6 @@ from compare.study.task import ProblemSpec, Stop, Task
 from metaheuristics import ParticleSwarm
 from metaheuristics.interface import Search, Start
 from nlp_gait.backends.kernel import library_cache
-from nlp_gait.errors import NoWorkersError, WorkerError
-from nlp_gait.processes import run_in_processes
 from tests.compare.cli import calls
 from tests.faults.processes import ROOT, fake_compiler, start, wait_for
 
@@ -153,54 +146,6 @@ def test_durations_do_not_follow_the_clock_on_the_wall(tmp_path: Path, monkeypat
 
 
 @pytest.mark.slow
-def test_cancelled_runs_are_not_reported_after_an_early_stop() -> None:
-    """Ctrl-C in a study is one sentence: joblib's warning of cancelled calls is not a second one."""
-    results = run_in_processes({number: partial(time.sleep, 0.05 * number) for number in range(12)}, workers=2)
-    assert next(results) == (0, None)
-    with warnings.catch_warnings(record=True) as heard:
-        warnings.simplefilter("always")
-        results.close()  # type: ignore[attr-defined]
-    assert not heard
-
-
-def test_workers_do_not_begin_in_a_folder_that_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    tmp_path.rmdir()
-    with pytest.raises(WorkerError, match="the working folder is gone"):
-        list(run_in_processes({k: partial(abs, k) for k in range(2)}, 2))
-
-
-@pytest.mark.parametrize(
-    ("error", "sentence"),
-    [
-        (OSError(errno.EMFILE, "Too many open files"), "too many files are open"),
-        (OSError(errno.ENFILE, "Too many open files in system"), "too many files are open"),
-        (BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"), "there are too many processes or threads"),
-        (RuntimeError("can't start new thread"), "there are too many processes or threads"),
-        (OSError(errno.ENOMEM, "Cannot allocate memory"), "there is not enough memory"),
-        (MemoryError("std::bad_alloc"), "there is not enough memory"),
-        (ImportError("x.so: failed to map segment from shared object"), "there is not enough memory"),
-    ],
-    ids=lambda value: str(value)[:40],
-)
-def test_a_shortage_at_the_start_of_workers_is_one_sentence(
-    error: Exception, sentence: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Joblib hides it behind an error of its own."""
-
-    def begin(self: object) -> None:
-        try:
-            raise error
-        finally:
-            raise UnboundLocalError
-
-    monkeypatch.setattr("joblib.externals.loky.backend.process.LokyProcess.start", begin)
-    get_reusable_executor().shutdown(wait=True, kill_workers=True)  # else its workers would do
-    with pytest.raises(NoWorkersError, match=f"cannot begin: {sentence}; use fewer --jobs"):
-        list(run_in_processes({k: partial(abs, k) for k in range(2)}, 2))
-
-
-@pytest.mark.slow
 def test_a_limit_of_open_files_is_one_sentence_and_keeps_runs(tmp_path: Path, undrawn_pictures: None) -> None:
     line = f"compare walk12 --algorithms random --starts 0 --evaluations 60 --out {tmp_path} --jobs"
     calls.nlp_gait(*line.split(), "1", "--runs", "2")
@@ -209,11 +154,3 @@ def test_a_limit_of_open_files_is_one_sentence_and_keeps_runs(tmp_path: Path, un
     assert done.returncode == 1 and done.stdout == "" and done.stderr.count("\n") == 1
     assert "too many files are open" in done.stderr
     assert len(list(tmp_path.glob("records/*/*.json"))) == 2
-
-
-@pytest.mark.parametrize("width", ["0", "-5", "", "wide", "٣", "80"])
-def test_a_terminal_without_a_width_has_the_usual_one(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", width)
-    monkeypatch.setenv("MPLBACKEND", "nonsense")
-    fix_environment()
-    assert os.environ.get("COLUMNS") == ("80" if width == "80" else None) and os.environ["MPLBACKEND"] == "agg"

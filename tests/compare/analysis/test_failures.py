@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -14,12 +15,21 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from metaheuristics import ParticleSwarm
+from nlp_gait.backends.kernel.compiler import find_compiler
 from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE
-from tests.faults.processes import ROOT, quick_compiler
+from tests.faults.processes import ROOT
 
 RUN = CliRunner()
 pytestmark = pytest.mark.usefixtures("undrawn_pictures")
 STUDY = "compare walk12 --algorithms pso,ga --runs 2 --starts 0 --evaluations 100 --jobs 1".split()
+
+
+def quick_compiler(folder: Path) -> str:
+    """Write a compiler that does not optimise, for tests of caches, which compile into an empty one."""
+    path = folder / "quick_compiler.sh"
+    path.write_text(f'#!/bin/sh\nexec {shlex.join(find_compiler().command)} "$@" -O0\n', encoding="utf-8")
+    path.chmod(0o700)
+    return str(path)
 
 
 def failing(monkeypatch: pytest.MonkeyPatch, calls: int) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from compare.analysis.units import format_quantity, make_axis_label
 from compare.questions.question import Work, find
-from compare.questions.sweep import Axis, Sweep, parse_axis, plot_sweep
+from compare.questions.sweep import MOST_POINTS, Axis, Sweep, parse_axis, plot_sweep
 from compare.questions.swept_walks import SweepPoint
 from compare.report.document import Table
 from nlp_gait import load
@@ -139,3 +139,10 @@ def test_labels() -> None:
     assert make_axis_label("reach_margin", "1") == "reach margin"
     assert make_axis_label("hip_height_m.upper", "m") == "upper bound of hip height [m]"
     assert format_quantity("hip_height_m", "m", 0.31) == "hip height = 0.31 m"
+
+
+def test_a_sweep_is_as_large_as_its_grid() -> None:
+    axes = [parse_axis(f"{name}=0.05:0.13:101") for name in ("step_length_m", "frontal_shift_m")]
+    expected = rf"at most {MOST_POINTS} points in all, got 101 of step_length_m x 101 of frontal_shift_m = 10201"
+    with pytest.raises(InputError, match=expected):
+        Sweep(problem=load("walk12"), axes=axes)

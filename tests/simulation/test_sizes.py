@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from compare.questions.sweep import MOST_POINTS, Sweep, parse_axis
 from nlp_gait import load
 from nlp_gait.errors import InputError
 from nlp_gait.export.formats import FORMATS, write_as
@@ -20,13 +19,6 @@ from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.plan import LONGEST_S as LONGEST_PLAYED_S
 from nlp_gait.simulation.plan import MOST_STEPS, make_plan
 from nlp_gait.simulation.video import MOST_FRAMES, check_frames
-
-
-def test_a_sweep_is_as_large_as_its_grid() -> None:
-    axes = [parse_axis(f"{name}=0.05:0.13:101") for name in ("step_length_m", "frontal_shift_m")]
-    expected = rf"at most {MOST_POINTS} points in all, got 101 of step_length_m x 101 of frontal_shift_m = 10201"
-    with pytest.raises(InputError, match=expected):
-        Sweep(problem=load("walk12"), axes=axes)
 
 
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle"])

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from compare.__main__ import fix_environment
 from compare.cli import app
 from nlp_gait import __version__, load
 from nlp_gait.errors import GaitError, OutputError
@@ -187,3 +188,11 @@ def test_no_room_for_temporary_files_is_one_sentence(tmp_path: Path) -> None:
     done = in_own_mounts(script, str(tmp_path))
     assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
     assert done.stderr.startswith("nlp-gait: no folder for temporary files: ") and "TMPDIR" in done.stderr
+
+
+@pytest.mark.parametrize("width", ["0", "-5", "", "wide", "٣", "80"])
+def test_a_terminal_without_a_width_has_the_usual_one(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", width)
+    monkeypatch.setenv("MPLBACKEND", "nonsense")
+    fix_environment()
+    assert os.environ.get("COLUMNS") == ("80" if width == "80" else None) and os.environ["MPLBACKEND"] == "agg"
