@@ -4,6 +4,7 @@ What can be computed is computed again and compared: every point, random runs, r
 """
 
 import json
+import math
 import random
 import time
 from collections import defaultdict
@@ -291,7 +292,7 @@ def _choose_runs(records: Sequence[RunRecord], share: float | None) -> tuple[lis
     known = [record for record in records if not record.inputs.imported]
     random.SystemRandom().shuffle(known)
     if share is not None:
-        count = round(share * len(known)) if share == 0.0 else max(1, round(share * len(known)))
+        count = math.ceil(share * len(known))
         return known[:count], count
     first: dict[object, RunRecord] = {}
     priced = [r for r in known if r.active_constraints and r.verdict.feasible]
@@ -300,9 +301,8 @@ def _choose_runs(records: Sequence[RunRecord], share: float | None) -> tuple[lis
         first.setdefault(record.problem, record)
     for record in known:
         first.setdefault((record.problem, record.solver), record)
-    needed = list({id(record): record for record in first.values()}.values())
-    chosen = {id(record) for record in needed}
-    return [*needed, *(record for record in known if id(record) not in chosen)], len(needed)
+    needed = {id(record): record for record in first.values()}
+    return [*{**needed, **{id(record): record for record in known}}.values()], len(needed)
 
 
 def _repeat_runs(

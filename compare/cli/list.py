@@ -106,24 +106,8 @@ def _describe_robot(name: str, target: Path | None) -> Output:
     )
 
 
-def collect_names() -> dict[str, Any]:
-    """Return what `listed.json` has: problems with title and numbers of variables and parameters, and all other names."""
-    from compare.study.task import list_solvers
-    from metaheuristics.multi_objective import FRONT_ALGORITHMS
-    from nlp_gait import formulation
-    from nlp_gait.robots import list_robots
-
-    problems = {name: formulation.load(name) for name in formulation.list_problems()}
-    return {
-        "problems": {name: [p.title, len(p.names), len(p.own_parameters)] for name, p in problems.items()},
-        "algorithms": list(list_solvers()),
-        "fronts": list(FRONT_ALGORITHMS),
-        "robots": list(list_robots()),
-    }
-
-
 def _list_all() -> Output:
-    """List names from a file, which a test compares with ``collect_names``: nothing else is imported."""
+    """List names from a file, which a test compares with the code: nothing else is imported."""
     listed = json.loads(files("compare.cli").joinpath("listed.json").read_text(encoding="utf-8"))
     kinds: tuple[Literal["problem", "algorithm"], ...] = ("problem", "algorithm")
     installed = {f"{kind}s": find_entry_points(kind) for kind in kinds}

@@ -53,7 +53,7 @@ class JudgedGait:
         return dict(replace_nan(data))
 
 
-def judge_gait(gait: RecordedGait, *, in_engine: bool = True, seed: int = 0) -> JudgedGait:
+def judge_gait(gait: RecordedGait, *, in_engine: bool = True) -> JudgedGait:
     """Judge a recorded gait, solve for the optimum of the same step and durations, and simulate the gait, if ``in_engine``."""
     notes: list[str] = []
     if gait.motion.mirrored:
@@ -62,7 +62,7 @@ def judge_gait(gait: RecordedGait, *, in_engine: bool = True, seed: int = 0) -> 
         notes.append(f"held, because they are not in the file: {', '.join(gait.motion.held)}")
     optimum = engine = None
     try:
-        optimum = _solve_optimum(gait, seed)
+        optimum = _solve_optimum(gait)
     except GaitError as error:
         notes.append(f"no optimum of {gait.gait} for this step and duration: {error}")
     if in_engine:
@@ -75,9 +75,9 @@ def judge_gait(gait: RecordedGait, *, in_engine: bool = True, seed: int = 0) -> 
     )
 
 
-def _solve_optimum(gait: RecordedGait, seed: int) -> Evaluation:
+def _solve_optimum(gait: RecordedGait) -> Evaluation:
     problem = gait.make_planned()
-    solution = solve(problem, starts=STARTS, seed=seed)
+    solution = solve(problem, starts=STARTS)
     if not solution.converged:
         raise GaitError(solution.status)
     return evaluate(problem, solution.x)

@@ -41,14 +41,11 @@ GRACE_S = 5.0
 PLANNED_RUNS = 20
 
 
-def run_task(task: Task, callback: Callable[..., None] | None = None) -> RunRecord:
-    """Perform one run and judge its result; raises InputError if a search to polish has no point.
-
-    ``callback`` receives X, f, violation of every generation of a search.
-    """
+def run_task(task: Task) -> RunRecord:
+    """Perform one run and judge its result; raises InputError if a search to polish has no point."""
     if not task.is_search:
         return _solve(task)
-    search = _search(task, callback)
+    search = _search(task)
     return _solve(task, search) if task.polish else search
 
 
@@ -160,7 +157,7 @@ class _Counter:
         return _judge_search(own, self._problem, record.best_x, record.best, counts, history, listed)
 
 
-def _search(task: Task, callback: Callable[..., None] | None) -> RunRecord:
+def _search(task: Task) -> RunRecord:
     started = time.perf_counter()
     problem = task.problem.load()
     built = time.perf_counter()
@@ -178,7 +175,6 @@ def _search(task: Task, callback: Callable[..., None] | None) -> RunRecord:
             seed=task.run_seed,
             handling=make_handling(task.handling.name, **task.handling.settings),
             stop=stop.end_early(problem.objective.sign),
-            callback=callback,
         )
     times = Times(
         build=built - started, compile=compiled - built, solve=result.time_s, objective=result.objective_time_s

@@ -6,16 +6,29 @@ import json
 import subprocess
 import sys
 from importlib.resources import files
+from typing import Any
 
-from compare.cli.list import collect_names
+from compare.study.task import list_solvers
+from metaheuristics.multi_objective import FRONT_ALGORITHMS
+from nlp_gait import formulation
+from nlp_gait.robots import list_robots
 from tests.compare.cli.calls import as_json, nlp_gait
 
-REMEDY = "from compare.cli.list import collect_names; import json; print(json.dumps(collect_names(), indent=1))"
+
+def collect_names() -> dict[str, Any]:
+    """Return what `listed.json` has: problems with title and numbers of variables and parameters, and all other names."""
+    problems = {name: formulation.load(name) for name in formulation.list_problems()}
+    return {
+        "problems": {name: [p.title, len(p.names), len(p.own_parameters)] for name, p in problems.items()},
+        "algorithms": list(list_solvers()),
+        "fronts": list(FRONT_ALGORITHMS),
+        "robots": list(list_robots()),
+    }
 
 
 def test_the_shipped_list_is_that_of_the_code() -> None:
     shipped = json.loads(files("compare.cli").joinpath("listed.json").read_text(encoding="utf-8"))
-    assert shipped == collect_names(), f'python -c "{REMEDY}" > compare/cli/listed.json'
+    assert shipped == collect_names(), "python -m tests.compare.cli.test_listed > compare/cli/listed.json"
 
 
 def test_the_list_names_problems_algorithms_and_robots() -> None:
@@ -30,3 +43,7 @@ def test_listing_imports_neither_casadi_nor_numpy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
+
+
+if __name__ == "__main__":
+    print(json.dumps(collect_names(), indent=1))
