@@ -105,10 +105,8 @@ class Store:
         inputs = {computation.name: {**computation.inputs, **source} for computation in computations}
         values = {name: self.load(name, inputs[name]) for name in inputs}
         waiting = {c.name: c.function for c in computations if values[c.name] is MISSING}
-        for name in inputs:
-            self._count(COMPUTED if name in waiting else STORED, self._locate(name, inputs[name]))
-            if name not in waiting:
-                progress(f"{name}: stored by an earlier run")
+        for name in (name for name in inputs if name not in waiting):
+            progress(f"{name}: stored by an earlier run")
         workers = min(jobs or available_cores(), len(waiting))
         if workers > 1:
             for name, value in run_in_processes(waiting, workers):
@@ -132,12 +130,16 @@ class Store:
         if not isinstance(content, dict) or content.keys() != {"inputs", "result", "sha256"}:
             return MISSING
         is_intact = content["sha256"] == hash_json([content["result"], content["inputs"]])
-        return content["result"] if is_intact and _have_same_probes(content["inputs"], inputs) else MISSING
+        if not is_intact or not _have_same_probes(content["inputs"], inputs):
+            return MISSING
+        self._count(STORED, path)
+        return content["result"]
 
     def save(self, name: str, inputs: Mapping[str, Any], value: Any) -> Any:
         """Store a result, and return it as ``load`` does; raises as ``compute_all``."""
         value, inputs = pass_through_json(value), pass_through_json(inputs)
         path = self._locate(name, inputs)
+        self._count(COMPUTED, path)
         if path is not None:
             try:
                 make_writable_folder(path.parent)
@@ -197,11 +199,6 @@ def store_runs(store: Store, solver: Solver | None = None) -> Solver:
     return chosen if store.folder is None else _StoredSolver(chosen, store)
 
 
-class _Interrupted(Exception):
-    def __init__(self, outcome: Outcome | None) -> None:
-        self.outcome = outcome
-
-
 class _StoredSolver(Solver):
     """A solver that loads stored runs, and is prepared only for those that are not stored."""
 
@@ -244,17 +241,13 @@ class _StoredSolver(Solver):
     ) -> Outcome | None:
         settings = self._solver.choose_settings(problem, self._solves)
         inputs = {**fingerprint(problem), "solver": settings.name, "settings": settings.to_dict(), **start}
-
-        def compute() -> Any:
+        inputs[CODE] = _hash_code([ipopt])
+        stored = self._store.load("solve", inputs)
+        if stored is MISSING:
             outcome = run(self._solver.prepare(problem, self._solves))
             if stop():
-                raise _Interrupted(outcome)
-            return None if outcome is None else encode_outcome(outcome)
-
-        try:
-            stored = self._store.compute("solve", inputs, compute, code=[ipopt])
-        except _Interrupted as interrupted:
-            return interrupted.outcome
+                return outcome
+            stored = self._store.save("solve", inputs, None if outcome is None else encode_outcome(outcome))
         return None if stored is None else parse_outcome(stored)
 
 
