@@ -71,7 +71,7 @@ def _check_entries(owner: str, entries: list[zipfile.ZipInfo]) -> None:
             (is_odd, "has a name that is not allowed"),
             (len(place.parts) > MOST_LEVELS, f"is more than {MOST_LEVELS} folders deep"),
             (".." in place.parts or name.casefold() in seen, "is there twice, or outside of its folder"),
-            (name.endswith("/") or kind not in (0, stat.S_IFREG), "is not a plain file, but a folder or a link"),
+            (kind not in (0, stat.S_IFREG), "is not a plain file, but a folder or a link"),
             (entry.flag_bits & 1, "is encrypted"),
             (size > min(LARGEST_FILE, 2**20 + HIGHEST_RATIO * entry.compress_size), f"is too large: {size:,} bytes"),
         ):

@@ -213,10 +213,8 @@ def describe_sharpest_turn(problem: GaitProblem) -> list[str]:
     ]
 
 
-def describe_stops(end: Round | None) -> str:
+def describe_stops(end: Round) -> str:
     """Return the most effective limits in words, without the samples of their rows."""
-    if end is None:
-        return "-"
     names = dict.fromkeys(f"{s.name.partition(',')[0].rstrip(']')}{']' * ('[' in s.name)}" for s in end.stops)
     return join_words(list(names)[:SHOWN]) or "no limit with a price"
 
