@@ -103,7 +103,7 @@ def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
         (good.replace('"schema": 5', '"schema": 1'), "'schema' must be 5, got 1"),
         (good.replace('"history": {', '"history": 3, "other": {'), "damaged"),
         (good.replace(' "failed_evaluations": 0,\n', ""), "it must have every field"),
-        (good.replace('  "dense": null,\n', ""), "it must have every field"),
+        (good.replace('  "feasible": true,\n', ""), "it must have every field"),
     ):
         path.write_text(text)
         with pytest.raises(InputError, match=message):
