@@ -100,7 +100,7 @@ def evaluate_rounded(problem: GaitProblem, printed: Sequence[str], claimed: str 
     costs = [point.values.cost for point in points if math.isfinite(point.values.cost)] or [math.nan]
     sign = problem.objective.sign
     best, worst = sign * min(costs), sign * max(costs)
-    enclosure = None if parts is None else sorted((sign * parts.lower[:, 0].min(), sign * parts.upper[:, 0].max()))
+    enclosure = None if parts is None else sorted((sign * parts[0, :, 0].min(), sign * parts[1, :, 0].max()))
     if enclosure is not None and not np.isfinite(enclosure).all():
         enclosure = None
     feasible, how = _decide(points, parts)
@@ -139,15 +139,11 @@ def _read_interval(name: str, text: str) -> tuple[float, float]:
     return math.nextafter(float(value - half), -math.inf), math.nextafter(float(value + half), math.inf)
 
 
-class _Parts(NamedTuple):
-    """Bounds of cost and signed violations, divided by their scales, over parts of the box; infinite where unknown."""
+def _search(problem: GaitProblem, box: Array, rows: Numbers) -> tuple[list[_Point], Array | None]:
+    """Evaluate points of the box, and enclose its parts; None without a compiler, or for an operation without enclosure.
 
-    lower: Array  # (P, 1 + r)
-    upper: Array  # (P, 1 + r)
-
-
-def _search(problem: GaitProblem, box: Array, rows: Numbers) -> tuple[list[_Point], _Parts | None]:
-    """Evaluate points of the box, and enclose its parts; None without a compiler, or for an operation without enclosure."""
+    The enclosures (2, P, 1 + r) are bounds of cost and signed violations, divided by their scales; infinite where unknown.
+    """
     model, points = build_exact_model(problem), list[_Point]()
     scales = model.row_scales[rows]
 
@@ -165,31 +161,29 @@ def _search(problem: GaitProblem, box: Array, rows: Numbers) -> tuple[list[_Poin
         return points, None
     low, high = (bound[rows] for bound in build_kernel(problem).row_bounds(problem))
     fixed, symbols = np.stack([problem.p] * 2, axis=-1), np.append(np.arange(len(box)), [-1] * len(problem.p))
-    boxes, done = box[None], list[_Parts]()
+    boxes, done = box[None], list[Array]()
     while True:
         given = np.concatenate([boxes, np.broadcast_to(fixed, (len(boxes), *fixed.shape))], axis=1)
         forms: AffineForms = function(given, symbols)
         columns = np.append(0, 1 + rows)
         least, most, slopes = forms.lower[:, columns], forms.upper[:, columns], forms.slopes[:, columns]
-        parts = _Parts(
-            np.hstack([least[:, :1], np.maximum(least[:, 1:] - high, low - most[:, 1:]) / scales]),
-            np.hstack([most[:, :1], np.maximum(most[:, 1:] - high, low - least[:, 1:]) / scales]),
-        )
-        parts = _Parts(np.nan_to_num(parts.lower, nan=-np.inf), np.nan_to_num(parts.upper, nan=np.inf))
-        worst = 1 + parts.upper[:, 1:].argmax(axis=1)
+        lower = np.hstack([least[:, :1], np.maximum(least[:, 1:] - high, low - most[:, 1:]) / scales])
+        upper = np.hstack([most[:, :1], np.maximum(most[:, 1:] - high, low - least[:, 1:]) / scales])
+        lower, upper = parts = np.stack([np.nan_to_num(lower, nan=-np.inf), np.nan_to_num(upper, nan=np.inf)])
+        worst = 1 + upper[:, 1:].argmax(axis=1)
         for k, (centre, half) in enumerate(zip(boxes.mean(axis=2), np.diff(boxes)[..., 0] / 2, strict=True)):
             for direction in (np.sign(slopes[k, 0]), np.sign(slopes[k, worst[k]])):
                 evaluate(centre + half * direction)
                 evaluate(centre - half * direction)
         costs = [point.values.cost for point in points if math.isfinite(point.values.cost)] or [math.nan]
         gap = COST_SHARE * (max(costs) - min(costs))
-        unsure = (parts.lower[:, 0] < min(costs) - gap) | (parts.upper[:, 0] > max(costs) + gap)
+        unsure = (lower[:, 0] < min(costs) - gap) | (upper[:, 0] > max(costs) + gap)
         if _decide(points, None)[1] == "sampled":
-            unsure |= _is_feasible(parts.lower) & ~_is_feasible(parts.upper)
-        size = sum(len(piece.lower) for piece in done) + len(boxes)
-        if not unsure.any() or size + unsure.sum() > BOXES:
-            return points, _Parts(*(np.concatenate(ends) for ends in zip(*done, parts, strict=True)))
-        done.append(_Parts(parts.lower[~unsure], parts.upper[~unsure]))
+            unsure |= _is_feasible(lower) & ~_is_feasible(upper)
+        whole = np.concatenate([*done, parts], axis=1)
+        if not unsure.any() or whole.shape[1] + unsure.sum() > BOXES:
+            return points, whole
+        done.append(parts[:, ~unsure])
         effects = np.abs(slopes) / np.append(gap or 1.0, scales)[:, None]
         boxes = halve(boxes[unsure], np.nan_to_num(effects[unsure]).max(axis=1).argmax(axis=-1))
 
@@ -202,13 +196,13 @@ def _is_feasible(excess: Array) -> Any:
     return np.maximum(excess[:, 1:], 0.0).sum(axis=1) <= FEASIBILITY_TOLERANCE
 
 
-def _decide(points: Sequence[_Point], parts: _Parts | None) -> tuple[Where, How]:
+def _decide(points: Sequence[_Point], parts: Array | None) -> tuple[Where, How]:
     """Return whether the points are feasible, and how that is known."""
     good = [point.values.violation <= FEASIBILITY_TOLERANCE for point in points]
     if any(good) and not all(good):
         return "somewhere", "evaluated"
-    if parts is not None and all(good) and _is_feasible(parts.upper).all():
+    if parts is not None and all(good) and _is_feasible(parts[1]).all():
         return "everywhere", "enclosed"
-    if parts is not None and not any(good) and not _is_feasible(parts.lower).any():
+    if parts is not None and not any(good) and not _is_feasible(parts[0]).any():
         return "nowhere", "enclosed"
     return ("everywhere" if all(good) else "nowhere"), "sampled"
