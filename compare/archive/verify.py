@@ -349,9 +349,7 @@ def _repeat_run(record: RunRecord, moved: RunRecord) -> str:
 def _make_task(record: RunRecord, inputs: Inputs) -> Task:
     """Return the task of a record by its inputs, in which files of the problem may be elsewhere than in the record's.
 
-    Raises:
-        NotCheckedError: the run ended by the clock, its solver was an object in Python, or it needs other code than here.
-        UserCodeError: it needs user code that the command does not name.
+    Raises UserCodeError for code that the command does not name, and NotCheckedError for other runs that cannot be repeated here.
     """
     solver, stored = inputs.solver, decode(StoredProblem, inputs.problem, "problem")
     if not isinstance(solver, str):

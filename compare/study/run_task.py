@@ -194,16 +194,10 @@ def _judge_search(
     history: SearchHistory,
     listed: Collection[int] | None = None,
 ) -> RunRecord:
-    """Return a search's record with its best point, which is judged, and its history.
+    """Return the record of a search with its best point x (n,), which is judged, and its history.
 
-    Args:
-        record: of the run, with settings, status and times.
-        problem: that was solved.
-        x: (n,) best point.
-        best: its violation and objective, which is minimised.
-        counts: evaluations, failed ones, generations.
-        history: all entries.
-        listed: numbers of evaluations whose entries are kept; None chooses them.
+    ``best`` is violation and objective, which is minimised, at x; ``counts`` are evaluations, failed ones and generations.
+    Of the history the entries at ``listed`` numbers of evaluations are kept; None chooses them.
     """
     sign, (violation, objective) = problem.objective.sign, best
     course = [
