@@ -4,12 +4,10 @@ import inspect
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
-from nlp_gait.decoding import decode
 from nlp_gait.errors import unknown
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.gaitbench.facts import BY_ID
@@ -17,19 +15,6 @@ from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import is_user_code
 
 SECTION = re.compile(r"^(Attributes|Args|Raises|Returns|Source):$")
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Entry:
-    bibtex: str
-    cited_as: str = ""  # text by which a ``Source:`` names it
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Entries:
-    software: _Entry
-    papers: dict[str, _Entry]
-    suite: _Entry
 
 
 def find_citations(name: str | None = None) -> list[str]:
@@ -40,14 +25,14 @@ def find_citations(name: str | None = None) -> list[str]:
         UserCodeError: a user-defined problem cannot be loaded.
     """
     text = (files("compare.study") / "citations.toml").read_text(encoding="utf-8")
-    known = decode(_Entries, tomllib.loads(text.replace("VERSION", version("nlp-gait"))))
-    sources = [*known.papers.values(), known.suite]
-    if name in known.papers:
-        sources = [known.papers[name]]
+    known = tomllib.loads(text.replace("VERSION", version("nlp-gait")))
+    papers, sources = known["papers"], [*known["papers"].values(), known["suite"]]
+    if name in papers:
+        sources = [papers[name]]
     elif name is not None:
-        source = _find_source(name, {*PROBLEMS, *known.papers, *BY_ID})
-        sources = [entry for entry in sources if entry.cited_as in source]
-    return [entry.bibtex.strip() for entry in (known.software, *sources)]
+        source = _find_source(name, {*PROBLEMS, *papers, *BY_ID})
+        sources = [entry for entry in sources if entry["cited_as"] in source]  # text by which a ``Source:`` names it
+    return [entry["bibtex"].strip() for entry in (known["software"], *sources)]
 
 
 def _find_source(name: str, known: set[str]) -> str:
