@@ -238,7 +238,8 @@ def write_manifest(folder: Path, settings: StudySettings, session: Session) -> N
     """Add a session to the manifest of a folder, with the latest settings; raises InputError if the manifest is damaged."""
     with lock_folder(folder):
         file = _read_file(folder)
-        _write_file(folder, replace(file, study=settings.to_json(), sessions=(*file.sessions, session)))
+        file = replace(file, study=settings.to_json(), sessions=(*file.sessions, session))
+        write_json(folder / FILE, asdict(file))
 
 
 def list_runs(folder: Path, names: Sequence[str]) -> None:
@@ -251,15 +252,11 @@ def list_runs(folder: Path, names: Sequence[str]) -> None:
         solvers = {_name_solver(name) for name in names}
         others = [name for name in file.runs if _name_solver(name) not in solvers]
         if set(file.runs) != {*others, *names}:
-            _write_file(folder, replace(file, runs=(*others, *dict.fromkeys(names))))
+            write_json(folder / FILE, asdict(replace(file, runs=(*others, *dict.fromkeys(names)))))
 
 
 def _name_solver(name: str) -> str:
     return name.rsplit("-", 2)[0]  # without run and key
-
-
-def _write_file(folder: Path, file: _File) -> None:
-    write_json(folder / FILE, asdict(file))
 
 
 def _read_file(folder: Path) -> _File:

@@ -8,8 +8,9 @@ from __future__ import annotations
 import json
 import random
 import re
-import subprocess
+import shutil
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -100,13 +101,10 @@ def relabel(**labels: str) -> Forgery:
     return forge
 
 
-def edit_text(name: str, old: str, new: str) -> Callable[[Path], None]:
-    def change(folder: Path) -> None:
-        text = (folder / name).read_text()
-        assert old in text
-        (folder / name).write_text(text.replace(old, new, 1))
-
-    return change
+def edit_text(name: str, old: str, new: str, folder: Path) -> None:
+    text = (folder / name).read_text()
+    assert old in text
+    (folder / name).write_text(text.replace(old, new, 1))
 
 
 HALF = ("evaluations.f", lambda f: f // 2), ("history.evaluations", lambda v: [max(1, e // 2) for e in v])
@@ -141,7 +139,7 @@ def list_forgeries() -> Iterator[tuple[str, Forgery | Callable[[Path], None]]]:
         ("report.html", "pso", "pso*"), ("report.html", "ipopt", "IPOPT"), ("report.md", "pso", "mine"),
         ("report.md", "%", "% more"), ("walk12-final.svg", "pso", "mine"),
     ):  # fmt: skip
-        yield f"{old!r} in {name}", edit_text(name, old, new)
+        yield f"{old!r} in {name}", partial(edit_text, name, old, new)
 
 
 def find_forged(honest: Path, folder: Path, forgery: Callable[..., object]) -> str | None:
@@ -149,8 +147,8 @@ def find_forged(honest: Path, folder: Path, forgery: Callable[..., object]) -> s
     folder.mkdir()
     study = json.loads((honest / FILE).read_text())
     records = {path.stem: json.loads(path.read_text()) for path in sorted((honest / RECORDS).glob("*/*.json"))}
-    if forgery.__qualname__.startswith("edit_text"):
-        subprocess.run(["cp", "-r", f"{honest}/.", str(folder)], check=True)
+    if isinstance(forgery, partial):
+        shutil.copytree(honest, folder, dirs_exist_ok=True)
         forgery(folder)
     else:
         forgery(records, study)
@@ -170,10 +168,9 @@ def refuse(call: Callable[..., object], *arguments: object, accepted: bool = Fal
     """Return None if a call ends by one sentence of ours, or is perhaps accepted; what else happened."""
     try:
         result = call(*arguments)
-    except GaitError as error:
-        return None if "\n" not in str(error) else f"{error!s:.200}"
-    except Exception as error:  # anything else is a traceback for a user
-        return f"{type(error).__name__}: {error!s:.200}"
+    except Exception as error:  # other ones are a traceback for a user
+        is_sentence = isinstance(error, GaitError) and "\n" not in str(error)
+        return None if is_sentence else f"{type(error).__name__}: {error!s:.200}"
     return None if accepted else f"accepted {arguments!r:.200}: {result!r:.80}"
 
 
@@ -282,21 +279,20 @@ def test_no_consistent_forgery_is_called_whole(name: str, honest: Path, tmp_path
 
 @pytest.mark.slow
 def test_fewer_runs_that_are_planned_as_such_are_an_honest_study_of_fewer(honest: Path, tmp_path: Path) -> None:
-    """The limit of every check: what was run and never listed leaves no trace, and verify says so."""
+    """What was run and never listed leaves no trace."""
     assert find_forged(honest, tmp_path / "forged", drop("ga", 2, planned=False)) is not None
-    assert "runs that were made, but never listed" in verify_folder(tmp_path / "forged").scope[1]
 
 
 def test_the_honest_study_holds_and_says_what_was_not_checked(honest: Path) -> None:
     found = verify_folder(honest)
     assert all(finding.holds for finding in found.findings), [f.sentence for f in found.findings]
     assert "evaluated: 9 points; repeated: " in found.scope[0] and "times and machines: as recorded" in found.scope[1]
+    assert "runs that were made, but never listed" in found.scope[1]
 
 
 @pytest.mark.parametrize("every", [10, pytest.param(1, marks=pytest.mark.slow)])
 def test_no_number_file_or_text_gets_through(every: int, tmp_path: Path) -> None:
-    rng = random.Random(SEED)
-    attacks = [*list_numbers(rng), *list_files(rng, tmp_path)]
+    attacks = [*list_numbers(rng := random.Random(SEED)), *list_files(rng, tmp_path)]
     reached = {name: words for name, attack in attacks[::every] if (words := attack()) is not None}
     assert not reached and len(attacks) >= 400
 
