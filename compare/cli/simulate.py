@@ -136,6 +136,7 @@ def simulate(
     from compare.drawing.robot_figures import plot_simulation
     from compare.report.interactive import animate_simulation
     from nlp_gait.export.formats import write_npz
+    from nlp_gait.robots.loading import hold_robots
     from nlp_gait.simulation.engine import load_mujoco
     from nlp_gait.simulation.measurements import measure, measure_climb, measure_walk
     from nlp_gait.simulation.mjcf import make_plan_model
@@ -147,8 +148,10 @@ def simulate(
     if video is not None:
         check_video_path(video)
     folder = None if out is None else make_writable_folder(out)
-    drive, conditions, result = drive_options.make(), world.make(), stored.load()
-    plan = make_plan(result, steps)
+    drive, conditions = drive_options.make(), world.make()
+    with hold_robots():
+        result = stored.load()
+        plan = make_plan(result, steps)
     if video is not None:
         check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
     simulation = Run(plan, conditions, drive, sole)

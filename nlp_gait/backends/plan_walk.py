@@ -28,6 +28,7 @@ from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.gaits.humanoid.turning import list_turn
 from nlp_gait.gaits.nao.body import load_nao, make_nao
 from nlp_gait.progress import Progress, ignore_progress
+from nlp_gait.robots.loading import hold_robots
 
 NAO_WALK = "nao-walk"
 AT_BOUND = 1e-4  # share of a variable's range
@@ -137,6 +138,7 @@ class WalkSettings:
         return problem.with_values(**{**values, **self.values})
 
 
+@hold_robots()
 def plan_walk(
     robot: str = "nao-v5",
     steps: int | None = None,
@@ -173,6 +175,7 @@ def plan_walk(
     return _solve(problem, cycle, settings)
 
 
+@hold_robots()
 def plan_climb(
     robot: str, stairs: str, *, speed_m_s: float | None = None, settings: WalkSettings = WalkSettings()
 ) -> WalkPlan:
@@ -190,6 +193,7 @@ def plan_climb(
     return _solve(problem, _load_cycle(problem, None), settings)
 
 
+@hold_robots()
 def plan_route(
     robot: str,
     *,

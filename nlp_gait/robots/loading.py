@@ -2,7 +2,9 @@
 
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
@@ -24,6 +26,9 @@ LONGEST_CHAIN = 8  # of robots that extend each other
 MOST_JOINTS = 400  # among which legs are searched, which takes 2 s then, and eight times as long for twice as many
 # Fields that replace those of the extended file.
 REPLACED = ("name", "description", "root", "forward", "heat_loss_W_per_Nm2")
+
+# Robots from files by name or path, while ``hold_robots`` is active.
+_held: ContextVar[dict[str, Robot] | None] = ContextVar("held_robots", default=None)
 
 _DATA = resources.files("nlp_gait.robots") / "data"
 
@@ -80,13 +85,28 @@ def load_robot(name_or_path: str) -> Robot:
 
     What such a file does not state is inferred, see ``robots/inference.py``; a ``.json`` of the same name next to it overrides
     both. Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``. A file is read
-    again each time, because it may have changed. Raises UnknownNameError; RobotDataError for a file that cannot be read, is
-    damaged or describes an impossible robot; or MissingExtraError for a URDF without its extra.
+    again each time, because it may have changed, except within ``hold_robots``. Raises UnknownNameError; RobotDataError for a
+    file that cannot be read, is damaged or describes an impossible robot; or MissingExtraError for a URDF without its extra.
     """
     if not isinstance(name_or_path, str):
         raise UnknownNameError(f"the name of a robot must be a text, got {format_value(name_or_path)}")
     check_path(name_or_path, f"robot {name_or_path!r}", RobotDataError)
-    return _load(name_or_path) if is_robot_file(name_or_path) else _load_shipped(name_or_path)
+    held = _held.get()
+    if held is None or not is_robot_file(name_or_path):
+        return _load(name_or_path) if is_robot_file(name_or_path) else _load_shipped(name_or_path)
+    if name_or_path not in held:
+        held[name_or_path] = _load(name_or_path)
+    return held[name_or_path]
+
+
+@contextmanager
+def hold_robots() -> Iterator[None]:
+    """Read the files of each robot once while this context is active, also as a decorator; later changes do not count."""
+    token = _held.set({} if _held.get() is None else _held.get())
+    try:
+        yield
+    finally:
+        _held.reset(token)
 
 
 def is_robot_file(name_or_path: str) -> bool:

@@ -7,11 +7,12 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 from nlp_gait.errors import RobotDataError, UnknownNameError
-from nlp_gait.robots import list_robots, load_robot
+from nlp_gait.robots import list_robots, load_robot, loading
 from tests.robots.custom import written
 
 
@@ -207,3 +208,15 @@ def test_records_made_in_code_are_checked_like_those_of_a_file() -> None:
     for owner, name in ((robot, "name"), (robot.links["torso"], "mass_kg")):
         with pytest.raises(AttributeError):
             setattr(owner, name, None)
+
+
+def test_robot_of_a_file_is_read_once_while_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read = Mock(wraps=loading._read)
+    monkeypatch.setattr(loading, "_read", read)
+    path = written(tmp_path, tiny())
+    with loading.hold_robots():
+        robot = load_robot(path)
+        with loading.hold_robots():
+            assert load_robot(path) is robot
+        assert load_robot(path) is robot and read.call_count == 1
+    assert load_robot(path) is not robot

@@ -69,7 +69,11 @@ def load_nao(robot: str) -> Robot:
     NAO's head and neck become one with the torso; another robot may have fingers, or no neck. Raises InputError without the
     joints that the gait moves, or if the closed form does not solve its legs.
     """
-    loaded = load_robot(robot)
+    return lock_unused_joints(load_robot(robot))
+
+
+def lock_unused_joints(loaded: Robot) -> Robot:
+    """Return a robot of NAO's build with the joints locked at zero that no gait moves; raises as ``load_nao``."""
     try:
         for joint in nao_joints.JOINTS:
             loaded.joint(joint)
@@ -222,7 +226,8 @@ def make_nao(
     ``"held"`` are carried and do not swing. Without rotational inertia every link is a point mass; for the motors see
     ``gaits.biped.motors``.
     """
-    simulated = load_nao(robot)
+    full = load_robot(robot)
+    simulated = lock_unused_joints(full)
     left, right = (nao_joints.measure_leg(simulated, side) for side in "LR")
     leg_length = left.thigh_m + left.tibia_m
     ground = left.ankle_height_m - left.hip_m[2]
@@ -231,7 +236,7 @@ def make_nao(
     return NaoBody(
         family="nao",
         title="NAO",
-        full=load_robot(robot),
+        full=full,
         simulated=simulated,
         motors=parse_nao_motors(motors, simulated if rotational_inertia else make_point_masses(simulated)),
         joints=nao_joints.JOINTS,
