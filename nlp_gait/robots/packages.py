@@ -9,7 +9,6 @@ from functools import partial
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from typing import Any
 
 from nlp_gait.errors import RobotDataError, unknown
 
@@ -52,35 +51,17 @@ def find_robot_file(name: str) -> str:
         ) from error
 
 
-def list_package_robots(package: str) -> tuple[str, ...]:
-    """Return the names of all robots of an installed package; raises PackageNotFoundError."""
-    package = SHORT_NAMES.get(package, package)
-    return tuple(sorted(FINDERS.get(package, _list_files)(package)))
-
-
 def _list_files(package: str) -> Mapping[str, Locate]:
     """Return the URDF and MJCF files of a package by name, without scenes, which contain a robot's file."""
     paths = [Path(str(file.locate())) for file in distribution(package).files or () if file.suffix in MODEL_ENDINGS]
     models = [path for path in paths if not path.stem.startswith("scene") and _is_robot(path)]
     named: dict[str, Locate] = {}
-    for name_of in (_name_by_file, _name_by_folder, _name_by_both, str):
-        names = {path: name_of(path) for path in models}
+    for form in ("{file}", "{folder}", "{folder}/{file}", "{path}"):
+        names = {path: form.format(file=path.stem, folder=path.parent.name, path=path) for path in models}
         counts = Counter((*names.values(), *named))
         named |= {name: path.__str__ for path, name in names.items() if counts[name] == 1}
         models = [path for path, name in names.items() if counts[name] > 1]
     return named
-
-
-def _name_by_file(path: Path) -> str:
-    return path.stem
-
-
-def _name_by_folder(path: Path) -> str:
-    return path.parent.name
-
-
-def _name_by_both(path: Path) -> str:
-    return f"{path.parent.name}/{path.stem}"
 
 
 def _is_robot(path: Path) -> bool:
@@ -97,11 +78,7 @@ def _list_menagerie(package: str) -> Mapping[str, Locate]:
     """Return the robots of MuJoCo's menagerie, which the package downloads, or reads below ``MENAGERIE_ROOT``."""
     distribution(package)
     robots = import_module("mujoco_menagerie").robots()
-    return {robot.name: partial(_fetch_model, robot) for robot in robots}
-
-
-def _fetch_model(robot: Any) -> str:
-    return str(robot.xml(robot.default_model))
+    return {robot.name: partial(lambda model: str(model.xml(model.default_model)), robot) for robot in robots}
 
 
 def _list_descriptions(package: str) -> Mapping[str, Locate]:

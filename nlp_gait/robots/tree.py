@@ -191,14 +191,11 @@ def turn_parts(links: dict[str, Link], joints: dict[str, Joint], rotation: Array
 
 def move_root(root: str, links: dict[str, Link], joints: dict[str, Joint], height_m: float) -> None:
     """Move the origin of the root up; its body and its joints stay where they are."""
-    links[root] = replace(links[root], com_m=_lower(links[root].com_m, height_m))
+    offset = np.array([0.0, 0.0, height_m])
+    links[root] = replace(links[root], com_m=to_vector(links[root].com_m - offset))
     for name, joint in joints.items():
         if joint.parent == root:
-            joints[name] = replace(joint, origin_m=_lower(joint.origin_m, height_m))
-
-
-def _lower(place: tuple[float, float, float], height_m: float) -> tuple[float, float, float]:
-    return place[0], place[1], place[2] - height_m
+            joints[name] = replace(joint, origin_m=to_vector(joint.origin_m - offset))
 
 
 def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:

@@ -9,7 +9,7 @@ import pytest
 from nlp_gait.errors import RobotDataError, UnknownNameError
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.loading import hash_robot
-from nlp_gait.robots.packages import find_robot_file, list_package_robots
+from nlp_gait.robots.packages import find_robot_file
 from tests.robots.crooked import crooked_urdf
 
 
@@ -53,7 +53,8 @@ def test_files_of_one_name_in_folders_of_one_name_are_named_by_both(packages: Pa
     for file in files:
         write(packages / file, crooked_urdf())
     install(packages, "twice", *files)
-    assert list_package_robots("twice") == ("raw/first", "raw/second", "urdf/first", "urdf/second")
+    with pytest.raises(UnknownNameError, match=r"known: raw/first, raw/second, urdf/first, urdf/second(;|$)"):
+        find_robot_file("twice:none")
     assert Path(find_robot_file("twice:raw/second")) == packages / "b" / "raw" / "second.urdf"
 
 
@@ -62,7 +63,8 @@ def test_mjcf_files_are_robots_and_scenes_and_other_xml_files_are_not(packages: 
     write(packages / "m/scene.xml", "<mujoco><include file='robot.xml'/></mujoco>")
     write(packages / "m/package.xml", "<package/>")
     install(packages, "mjcf-robots", "m/robot.xml", "m/scene.xml", "m/package.xml")
-    assert list_package_robots("mjcf-robots") == ("robot",)
+    with pytest.raises(UnknownNameError, match=r"known: robot(;|$)"):
+        find_robot_file("mjcf-robots:none")
 
 
 @pytest.mark.parametrize(
@@ -103,7 +105,8 @@ def test_a_description_is_the_module_of_that_name(packages: Path, monkeypatch: p
     write(packages / "robot_descriptions/biped_description.py", f"URDF_PATH = {str(urdf)!r}\n")
     write(packages / "robot_descriptions/xacro_description.py", "XACRO_PATH = 'biped.xacro'\n")
     install(packages, "robot-descriptions")
-    assert list_package_robots("robot_descriptions") == ("biped", "xacro")
+    with pytest.raises(UnknownNameError, match=r"known: biped, xacro(;|$)"):
+        find_robot_file("robot_descriptions:none")
     for name in ("robot_descriptions:biped", "robot-descriptions:biped_description"):
         assert load_robot(name).name == "crooked"
     with pytest.raises(RobotDataError, match="neither a URDF nor an MJCF file"):

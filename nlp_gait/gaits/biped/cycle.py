@@ -26,9 +26,7 @@ from nlp_gait.gaits.biped.cycle_motion import (
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.impact import Impact
 from nlp_gait.gaits.biped.limits import BalanceMargins, Box, compute_margins, make_rows
-from nlp_gait.gaits.biped.loads import make_single_support_loads
-from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
+from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase, make_start_within_reach
 from nlp_gait.gaits.biped.samples import Loader
 from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, TORQUE_JUMP, MotionSection, Sequence, Switch
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
@@ -138,20 +136,10 @@ def make_walking_cycle(
     inelastic = landing == "inelastic"
     variables = make_cycle_variables(body, inelastic)
     plans, margins = make_cycle_planners(body, inelastic), make_cycle_margins(body)
-    loaders = {Support.SINGLE: make_single_support_loads(body), Support.DOUBLE: loads}
+    fields: dict[str, Any] = {"variables": variables, "grid": grid, "goal": goal}
     phases = {
-        kind: Phase(
-            body=body,
-            variables=variables,
-            duration=TIMES[kind],
-            plan=plans[kind],
-            loads=loader,
-            grid=grid,
-            limits=(*make_phase_limits(body, margins[kind]), *body.motors.limits),
-            goal=goal,
-            standing=kind.standing,
-        )
-        for kind, loader in loaders.items()
+        kind: make_phase(body, kind, margins[kind], loads, duration=TIMES[kind], plan=plan, **fields)
+        for kind, plan in plans.items()
     }
     touch_down = Impact(name="touch_down") if inelastic else Switch(name="touch_down")
     return WalkingCycle(

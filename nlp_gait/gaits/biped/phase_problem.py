@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Literal
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -14,10 +14,12 @@ from nlp_gait.formulation import Array, GaitProblem, NumericPoint, Point, Signal
 from nlp_gait.formulation.display import Display, SimulationModel, Skeleton, Tread
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped import limits
-from nlp_gait.gaits.biped.body import Body
+from nlp_gait.gaits.biped.body import Body, Support
 from nlp_gait.gaits.biped.bounds import make_usual_bounds
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
+from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Phase
+from nlp_gait.gaits.biped.samples import Loader
 from nlp_gait.gaits.biped.skeleton import draw_robot
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -51,6 +53,24 @@ def make_phase_limits(body: Body, balance: limits.BalanceMargins, *, solved: boo
         limits.TorqueChange(size),
         *((limits.DriveLimits(body.robot, size),) if body.drive_limits else ()),
         balance,
+    )
+
+
+def make_phase(
+    body: Body,
+    kind: Support,
+    balance: limits.BalanceMargins,
+    loads: Loader | None,
+    added_limits: Sequence[limits.Limit] = (),
+    **fields: Any,
+) -> Phase:
+    """Return a phase of a kind with the usual limits, others, and further fields; ``loads`` are those of double support."""
+    return Phase(
+        body=body,
+        loads=make_single_support_loads(body) if loads is None or kind is Support.SINGLE else loads,
+        limits=(*make_phase_limits(body, balance), *added_limits, *body.motors.limits),
+        standing=kind.standing,
+        **fields,
     )
 
 

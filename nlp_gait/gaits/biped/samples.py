@@ -38,6 +38,16 @@ Planner: TypeAlias = Callable[[InstantPoint, SX, Nonsmooth], Instant]
 Loader: TypeAlias = Callable[[Instant], Instant]  # adds torques, ZMP and the ground's wrenches to a planned motion
 
 
+class Quantity:
+    """A quantity of samples, read by the name of the attribute."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, samples: "Samples", owner: type) -> MX:
+        return samples.read(self._name)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Samples:
     """A phase at N + 1 samples, whose quantities are read by name; columns are samples."""
@@ -49,6 +59,18 @@ class Samples:
     duration: MX  # of the phase [s]
     progress: MX  # (1, N + 1) shares of the phase's time, from 0 to 1
     values: Mapping[str, MX]  # (k, N + 1) by name of the quantity
+
+    planned = Quantity()  # (k, N + 1) planned angles [rad]
+    reach = Quantity()  # (2, N + 1) cosines of the knees
+    torque = Quantity()  # (J, N + 1) torques [Nm]
+    power = Quantity()  # (m, N + 1) mechanical power of the joints that move [W], signed
+    zmp = Quantity()  # (2, N + 1) ZMP in the world [m]
+    miss = Quantity()  # (k, N + 1) distances by which legs miss their feet [m]; empty where they cannot
+    q = Quantity()  # (m, N + 1) angles of the joints that move [rad]
+    qd = Quantity()  # (m, N + 1) their velocities [rad/s]
+    qdd = Quantity()  # (m, N + 1) their accelerations [rad/s^2]
+    # (1, N + 1) height of the right sole above the left one [m]; of a sole that may tilt (4, N + 1), of its ``CORNERS``
+    swing_heights = Quantity()
 
     def read(self, name: str) -> MX:
         """Return a quantity (k, N + 1) by name; raises UnknownNameError if this kind of motion does not have it."""
@@ -74,59 +96,9 @@ class Samples:
         """Time between two samples [s], never zero."""
         return ca.fmax(self.duration, LEAST_DURATION) / self.steps
 
-    @property
-    def planned(self) -> MX:
-        """(k, N + 1) planned angles [rad]."""
-        return self.read("planned")
-
-    @property
-    def reach(self) -> MX:
-        """(2, N + 1) cosines of the knees."""
-        return self.read("reach")
-
-    @property
-    def torque(self) -> MX:
-        """(J, N + 1) torques [Nm]."""
-        return self.read("torque")
-
-    @property
-    def power(self) -> MX:
-        """(m, N + 1) mechanical power of the joints that move [W], signed."""
-        return self.read("power")
-
-    @property
-    def zmp(self) -> MX:
-        """(2, N + 1) ZMP in the world [m]."""
-        return self.read("zmp")
-
-    @property
-    def miss(self) -> MX:
-        """(k, N + 1) distances by which legs miss their feet [m]; empty where they cannot."""
-        return self.read("miss")
-
-    @property
-    def q(self) -> MX:
-        """(m, N + 1) angles of the joints that move [rad]."""
-        return self.read("q")
-
-    @property
-    def qd(self) -> MX:
-        """(m, N + 1) their velocities [rad/s]."""
-        return self.read("qd")
-
-    @property
-    def qdd(self) -> MX:
-        """(m, N + 1) their accelerations [rad/s^2]."""
-        return self.read("qdd")
-
     def wrench(self, side: str) -> MX:
         """Return the ground's wrench (6, N + 1) on a sole ``"L"`` or ``"R"``, about the point under its ankle [N, Nm]."""
         return self.read(f"wrench_{side}")
-
-    @property
-    def swing_heights(self) -> MX:
-        """(1, N + 1) height of the right sole above the left one [m]; of a sole that may tilt (4, N + 1), of its ``CORNERS``."""
-        return self.read("swing_heights")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,9 +14,8 @@ from nlp_gait.gaits.biped.bounds import make_hip_variables, make_lift_variable, 
 from nlp_gait.gaits.biped.curves import Trajectory, move_hip
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, Margins, SplineClearance, compute_margins
-from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
-from nlp_gait.gaits.biped.phase_problem import make_phase_limits
+from nlp_gait.gaits.biped.phase_problem import make_phase
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.symbolic import trajectories
@@ -138,17 +137,18 @@ def make_support_phase(
     last = (*lift, make_time_variable(body, name), *splines.variables)
     variables = (*make_hip_variables(body), *body.angle_variables, *last)
     names = [variable.name for variable in variables]
-    return Phase(
-        body=body,
+    return make_phase(
+        body,
+        name,
+        balance,
+        loads,
+        (*clearance, *curve_limits),
         variables=variables,
         duration=TIMES[name],
         plan=plan,
-        loads=loads or make_single_support_loads(body),
         grid=grid,
         derivatives=derivatives,
-        limits=(*make_phase_limits(body, balance), *clearance, *curve_limits, *body.motors.limits),
         goal=goal,
-        standing=name.standing,
         kinks=splines.kinks,
         start=splines.start_of(names),
     )

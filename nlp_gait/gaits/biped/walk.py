@@ -36,9 +36,9 @@ from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner, r
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.limits import RowsAndIndexes
-from nlp_gait.gaits.biped.loads import make_divided_loads, make_single_support_loads
+from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits
+from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
 from nlp_gait.gaits.biped.sequence import CYCLE, ENERGY_PER_METRE, End, MotionSection, Sequence
 from nlp_gait.gaits.biped.support_phases import limit_to_box, make_support_box
@@ -188,23 +188,11 @@ def make_walk_phases(
     """Return the phases by kind; planners are those of a right foot that stands, with loads, and of one that swings."""
     margins, goal = make_cycle_margins(body), make_goal(body, "power")
     box = make_support_box(body.robot, {"L": (0.0, body.feet_y[0]), "R": (0.0, body.feet_y[1])})
+    balance = margins | {Support.STAND: limit_to_box(box)}
+    fields: dict[str, Any] = {"variables": variables, "duration": DURATION, "grid": grid, "goal": goal}
     return {
-        kind: Phase(
-            body=body,
-            variables=variables,
-            duration=DURATION,
-            plan=planners[kind is Support.SINGLE],
-            loads=make_single_support_loads(body) if kind is Support.SINGLE else loads,
-            grid=grid,
-            limits=(*make_phase_limits(body, balance), *body.motors.limits),
-            goal=goal,
-            standing=kind.standing,
-        )
-        for kind, balance in {
-            Support.SINGLE: margins[Support.SINGLE],
-            Support.DOUBLE: margins[Support.DOUBLE],
-            Support.STAND: limit_to_box(box),
-        }.items()
+        kind: make_phase(body, kind, limit, loads, plan=planners[kind is Support.SINGLE], **fields)
+        for kind, limit in balance.items()
     }
 
 
