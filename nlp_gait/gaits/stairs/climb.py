@@ -29,8 +29,8 @@ from nlp_gait.gaits.stairs.planar_biped import MOVING
 from nlp_gait.gaits.stairs.planned_motion import (
     Stair,
     StepKind,
+    compute_heights,
     compute_shank_gaps,
-    compute_stair_height,
 )
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -249,16 +249,13 @@ def _make_instant(kind: StepKind) -> ca.Function:
     q, v, size = SX.sym("q", len(MOVING)), SX.sym("v", len(MOVING)), SX.sym("size", 2)
     points = biped.locate_points(biped.link_angles(q), SX(2, 1))
     steps, setback = Stair(size[0], size[1]), stair.SETBACK + EDGE_RESERVE
-    heights = [
-        points[name][1] - compute_stair_height(points[name][0], steps, setback, stair.EDGE_WIDTH, kind)
-        for name in "TSA"
-    ]
+    heights = compute_heights(points, steps, setback, stair.EDGE_WIDTH, kind)
     robot = biped.load_toe_foot_biped()
     centres = biped.locate_centres(points)
     centre = sum((biped.get_rod(link).mass_kg * place[0] for link, place in centres.items()), SX(0)) / robot.mass_kg
     ends = [points["H"], *(ca.jtimes(points[name], q, v) for name in "HA")]
     gaps = compute_shank_gaps(points, steps, stair.SETBACK, kind)
-    return ca.Function("instant", [q, v, size], ca.cse([ca.vertcat(*heights), gaps, centre, ca.vertcat(*ends)]))
+    return ca.Function("instant", [q, v, size], ca.cse([heights, gaps, centre, ca.vertcat(*ends)]))
 
 
 def _reach(ankle: Array) -> tuple[Array, Array]:

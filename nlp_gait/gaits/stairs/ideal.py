@@ -18,7 +18,7 @@ from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import StepMotion, make_simulation_model, make_skeleton, make_standing_step
 from nlp_gait.gaits.stairs.planar_biped import JOINTS, MOVING, StanceLoads
-from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, compute_posture, compute_stair_height
+from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, compute_heights, compute_posture
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 EDGE_WIDTH = 0.012  # of the sigmoid that replaces an edge of the stair [m]
@@ -242,13 +242,11 @@ class IdealStep:
 
     @cached_property
     def _instant(self) -> ca.Function:
-        """Swing toe, sole, ankle and hip (2,) from the stance ankle, and heights (3,) of the first three above the stair [m]."""
+        """Swing toe, ankle and hip (2,) from the stance ankle, and heights (3,) of toe, sole and ankle above the stair [m]."""
         q, size = SX.sym("q", len(MOVING)), SX.sym("size", 2)
         places = biped.locate_points(biped.link_angles(q), SX(2, 1))
-        toe, sole, ankle, hip = (places[name] for name in "TSAH")
-        on = Stair(size[0], size[1])
-        heights = [p[1] - compute_stair_height(p[0], on, stair.SETBACK, EDGE_WIDTH) for p in (toe, sole, ankle)]
-        return ca.Function("places", [q, size], ca.cse([toe, sole, ankle, hip, ca.vertcat(*heights)]))
+        heights = compute_heights(places, Stair(size[0], size[1]), stair.SETBACK, EDGE_WIDTH)
+        return ca.Function("places", [q, size], ca.cse([*(places[name] for name in "TAH"), heights]))
 
     def limit_motion(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
         """Return rows of the quantised dynamics (eqs. 44, 45)."""
@@ -267,7 +265,7 @@ class IdealStep:
         n, lift = self.intervals, self.toe_off
         size = ca.vertcat(*stair.read_stair(point))
         q = x["angle"]
-        swing_toe, _, ankle, _, _ = self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1))
+        swing_toe, ankle, *_ = self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1))
         flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
         rear = self.behind * size
         toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(biped.load_toe_foot_biped().foot_m, 0) - rear, 1, lift)
@@ -285,7 +283,7 @@ class IdealStep:
         """Return rows of the hip's advance and of the swing foot's height above the stair."""
         n, lift = self.intervals, self.toe_off
         size = ca.vertcat(*stair.read_stair(point))
-        _, _, _, hip, heights = self._instant.map(n + 1)(x["angle"], ca.repmat(size, 1, n + 1))
+        *_, hip, heights = self._instant.map(n + 1)(x["angle"], ca.repmat(size, 1, n + 1))
         advance = hip[:, n] - hip[:, 0] - size
         in_support, in_swing = range(lift), range(lift + 1, n + 1)
 

@@ -108,37 +108,16 @@ def stairs_plan(
     )
     variables = VARIABLES if balance == "feet" else stair.GOVERNING_VARIABLES
 
-    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        return _assemble(point, planned, minimise, ops)
-
-    def motion(point: NumericPoint) -> Signals:
-        samples = planned.samples(point, Exact())
-        arrays = {name: np.array(ca.evalf(value)).T for name, value in samples._asdict().items()}
-        moving = stair.make_joint_signals(*(arrays.pop(name) for name in ("q", "qd", "qdd")))
-        renamed = {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
-        renamed["power"] = arrays.pop("power")[:, : len(JOINTS)]
-        return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays}, columns=stair.COLUMNS)
-
-    def step_motion(point: NumericPoint) -> StepMotion:
-        fine = PlannedStep(per_phase=FINE_INTERVALS).samples(point, Exact())
-        t, q, qd, qdd, stance = (
-            np.array(ca.evalf(part)).T for part in (fine.time, fine.q, fine.qd, fine.qdd, fine.stance_force)
-        )
-        new = np.diff(t[:, 0], prepend=-1.0) > 0.0  # where phases meet, the end of the earlier one
-        t, q, qd, qdd, stance = (part[new] for part in (t, q, qd, qdd, stance))
-        toe = compute_ground_force(q, qd, qdd) - stance
-        return make_standing_step(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe), float(point["t2_s"]))
-
-    model = make_simulation_model(step_motion) if balance == "feet" else None
+    model = make_simulation_model(_simulate) if balance == "feet" else None
     return GaitProblem(
         name="stairs-plan",
         title="Stairs, planned step: least energy or jerk",
         variables=variables,
         own_parameters=PARAMETERS,
         objective=OBJECTIVES[minimise],
-        assemble=assemble,
+        assemble=partial(_assemble, planned, minimise),
         grid=Grid(intervals=intervals, refined_by="intervals"),
-        display=Display(motion=motion, skeleton=make_skeleton, simulation_model=model),
+        display=Display(motion=partial(_compute_signals, planned), skeleton=make_skeleton, simulation_model=model),
         hints=SolverHints(start=partial(_start, variables)),
         rows_over_time=tuple(
             RowsOverTime(
@@ -150,6 +129,26 @@ def stairs_plan(
             for i, name in enumerate(PHASES)
         ),
     )
+
+
+def _compute_signals(planned: PlannedStep, point: NumericPoint) -> Signals:
+    samples = planned.samples(point, Exact())
+    arrays = {name: np.array(ca.evalf(value)).T for name, value in samples._asdict().items()}
+    moving = stair.make_joint_signals(*(arrays.pop(name) for name in ("q", "qd", "qdd")))
+    renamed = {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
+    renamed["power"] = arrays.pop("power")[:, : len(JOINTS)]
+    return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays}, columns=stair.COLUMNS)
+
+
+def _simulate(point: NumericPoint) -> StepMotion:
+    fine = PlannedStep(per_phase=FINE_INTERVALS).samples(point, Exact())
+    t, q, qd, qdd, stance = (
+        np.array(ca.evalf(values)).T for values in (fine.time, fine.q, fine.qd, fine.qdd, fine.stance_force)
+    )
+    new = np.diff(t[:, 0], prepend=-1.0) > 0.0  # where phases meet, the end of the earlier one
+    t, q, qd, qdd, stance = (values[new] for values in (t, q, qd, qdd, stance))
+    toe = compute_ground_force(q, qd, qdd) - stance
+    return make_standing_step(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe), float(point["t2_s"]))
 
 
 def _find_phase_times(phase: int, values: Mapping[str, float]) -> tuple[float, float]:
@@ -202,7 +201,7 @@ def _make_rows_at(point: Point, samples: PlanSamples, step: PlannedStep) -> tupl
     )
 
 
-def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmooth) -> Assembly:
+def _assemble(step: PlannedStep, minimise: Minimise, point: Point, ops: Nonsmooth) -> Assembly:
     samples = step.samples(point, ops)
     jerk = step.jerk(samples, point["quantum_s"])
     exact = Exact()

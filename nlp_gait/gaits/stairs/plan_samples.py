@@ -1,7 +1,8 @@
 """A planned step, sampled phase by phase: posture, torques, ground force, balance as the paper checks it, and clearance."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Literal, NamedTuple
 
 import casadi as ca
@@ -86,11 +87,13 @@ class PlannedStep:
 
     def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> MX:
         """Return heights (3, m) of toe, sole and ankle of the swing foot above the stair [m]."""
-        return self._map_samples(make_clearance_function(ops), point, *(grid or self.clearance_grid))
+        heights = partial(planned.compute_heights, setback=SETBACK, width=EDGE_WIDTH)
+        return self._map_samples(make_place_function(heights, ops), point, *(grid or self.clearance_grid))
 
     def shank_gaps(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> MX:
         """Return by how much the shanks stay outside the steps (g, m) [m]."""
-        return self._map_samples(make_shank_function(ops), point, *(grid or self.grid))
+        gaps = partial(planned.compute_shank_gaps, setback=SETBACK)
+        return self._map_samples(make_place_function(gaps, ops), point, *(grid or self.grid))
 
     def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
         """Return the integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
@@ -227,21 +230,11 @@ def _list_outputs(inputs: list[SX], plan: StairPlan, step: Posture, *loads: SX) 
     return [ca.dot(plan.durations, inputs[0]), *step.q, step.reach, *loads[:-1], *places, loads[-1]]
 
 
-def make_clearance_function(ops: Nonsmooth) -> ca.Function:
-    """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``make_balanced_function``."""
-    inputs, _, stair, step = make_step_symbols(ops)
-    places = biped.locate_points(biped.link_angles(step.q.position), SX(2, 1))
-    heights = [
-        places[name][1] - planned.compute_stair_height(places[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"
-    ]
-    return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
-
-
-def make_shank_function(ops: Nonsmooth) -> ca.Function:
-    """Return the function of ``compute_shank_gaps``; inputs of ``make_balanced_function``."""
+def make_place_function(measure: Callable[[Mapping[str, SX], Stair[SX]], SX], ops: Nonsmooth) -> ca.Function:
+    """Return the function of a measure of points by name and the stair; inputs of ``make_balanced_function``."""
     inputs, _, stair, step = make_step_symbols(ops)
     points = biped.locate_points(biped.link_angles(step.q.position), SX(2, 1))
-    return ca.Function("shanks", inputs, [ca.cse(planned.compute_shank_gaps(points, stair, SETBACK))])
+    return ca.Function("measure", inputs, [ca.cse(measure(points, stair))])
 
 
 @cache

@@ -76,6 +76,14 @@ def compute_stair_height(x: SX, stair: Stair[SX], setback: float, width: float, 
     return stair.rise * (smooth_edge(0.0) + smooth_edge(stair.tread) - 1)
 
 
+def compute_heights(
+    points: Mapping[str, SX], stair: Stair[SX], setback: float, width: float, step: StepKind = "next"
+) -> SX:
+    """Return the heights (3,) of toe, sole and ankle of the swing foot above the stair [m], see ``compute_stair_height``."""
+    places = (points[name] for name in "TSA")
+    return ca.vertcat(*(place[1] - compute_stair_height(place[0], stair, setback, width, step) for place in places))
+
+
 def compute_shank_gaps(points: Mapping[str, SX], stair: Stair[SX], setback: float, step: StepKind = "next") -> SX:
     """Return by how much the shanks stay outside the edges of the steps ahead of them (g,) [m], see ``list_shank_edges``.
 

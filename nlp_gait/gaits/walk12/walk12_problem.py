@@ -1,6 +1,7 @@
 """The 12-joint walk: stability margin against step length (Goswami, Vadakkepat, Phung 2008, section 5)."""
 
 import math
+from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
@@ -65,35 +66,7 @@ def walk12(
     if intervals < 2 or intervals % 2:
         raise InputError(f"intervals must be an even whole number >= 2 (panels of two), got {intervals!r}")
     robot = walk12_model.load_point_mass_biped()
-
-    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        T = point["step_time_s"]
-        s = point["step_length_m"]
-        zmp_at = _make_zmp_function(robot, ops, zmp)
-        phases, weights = make_rule(quadrature, intervals)
-        places = _sample_zmp(zmp_at, point, phases)
-        Q = T * ca.sum1(places**2) @ weights  # (eq. 9)
-        if horizon == "1s":
-            steps = ca.floor(1 / T)
-            begun = 1 / T - steps  # share of the last step within the second
-            Q = steps * Q + begun * T * ca.sum1(_sample_zmp(zmp_at, point, begun * phases) ** 2) @ weights
-        if quadrature != "simpson":
-            places = _sample_zmp(zmp_at, point, DM(np.linspace(0.0, 1.0, intervals + 1)).T)
-        q = SX.sym("q")
-        f1 = ops.call(ca.Function("f1", [q], [1 / q]), Q)  # (eq. 10)
-        f = point["lambda"] * f1 / point["f1max"] + (1 - point["lambda"]) * s / point["f2max_m"]  # (eq. 11)
-        indexes = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T)}
-        panels = intervals // 2  # of Simpson's rule, at whose ends the knees bend
-        names = [f"{k / panels:g} T" for k in range(panels + 1)]
-        reach = _limit_reach(point, robot, DM(np.linspace(0.0, 1.0, panels + 1)).T, names)
-        return Assembly(objective=f, constraints=(reach,), indexes={**indexes, **_measure_stability(places, robot)})
-
-    def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
-        zmp_at = _sample_zmp(_make_zmp_function(robot, ops, zmp), point, phases)
-        Q = point["step_time_s"] * ca.sum1(ca.sum2(zmp_at**2)) / phases.shape[1]
-        reach = _limit_reach(point, robot, phases, [""] * phases.shape[1])
-        return Assembly(objective=MX(0), constraints=(reach,), indexes={"Q_m2s": Q} if horizon == "step" else {})
-
+    walk = Walk12(intervals=intervals, horizon=horizon, zmp=zmp, quadrature=quadrature, robot=robot)
     means = ("Q_m2s",) if horizon == "step" else ()
     return GaitProblem(
         name="walk12",
@@ -101,18 +74,63 @@ def walk12(
         variables=VARIABLES,
         own_parameters=PARAMETERS,
         objective=Objective(name="f", unit="1", sense="maximise"),
-        assemble=assemble,
+        assemble=walk.assemble,
         grid=Grid(intervals=intervals, refined_by="intervals"),
         display=Display(
             motion=partial(compute_steps_at, robot=robot, intervals=intervals, zmp=zmp),
             skeleton=partial(make_skeleton, robot),
         ),
         rows_over_time=(
-            RowsOverTime(assemble=at_phases, times=lambda values: (0.0, values["step_time_s"]), means=means),
+            RowsOverTime(
+                assemble=walk.assemble_over_time, times=lambda values: (0.0, values["step_time_s"]), means=means
+            ),
         ),
         # All of 640 random starts converge; with the exact Hessian, 5 fail.
         hints=SolverHints(hessian="limited-memory"),
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Walk12:
+    """One step in a reading of the paper, see ``walk12``."""
+
+    intervals: int
+    horizon: Horizon
+    zmp: walk12_model.Zmp
+    quadrature: Quadrature
+    robot: walk12_model.PointMassBiped
+
+    def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
+        """Return the objective, the reach at the ends of Simpson's panels, and the indexes."""
+        T = point["step_time_s"]
+        s = point["step_length_m"]
+        zmp_at = _make_zmp_function(self.robot, ops, self.zmp)
+        phases, weights = make_rule(self.quadrature, self.intervals)
+        places = _sample_zmp(zmp_at, point, phases)
+        Q = T * ca.sum1(places**2) @ weights  # (eq. 9)
+        if self.horizon == "1s":
+            steps = ca.floor(1 / T)
+            begun = 1 / T - steps  # share of the last step within the second
+            Q = steps * Q + begun * T * ca.sum1(_sample_zmp(zmp_at, point, begun * phases) ** 2) @ weights
+        if self.quadrature != "simpson":
+            places = _sample_zmp(zmp_at, point, DM(np.linspace(0.0, 1.0, self.intervals + 1)).T)
+        q = SX.sym("q")
+        f1 = ops.call(ca.Function("f1", [q], [1 / q]), Q)  # (eq. 10)
+        f = point["lambda"] * f1 / point["f1max"] + (1 - point["lambda"]) * s / point["f2max_m"]  # (eq. 11)
+        indexes = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T)}
+        panels = self.intervals // 2  # of Simpson's rule, at whose ends the knees bend
+        names = [f"{k / panels:g} T" for k in range(panels + 1)]
+        reach = _limit_reach(point, self.robot, DM(np.linspace(0.0, 1.0, panels + 1)).T, names)
+        indexes |= _measure_stability(places, self.robot)
+        return Assembly(objective=f, constraints=(reach,), indexes=indexes)
+
+    def assemble_over_time(self, point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
+        """Return the reach and the integrand's mean at phases (1, k)."""
+        places = _sample_zmp(_make_zmp_function(self.robot, ops, self.zmp), point, phases)
+        Q = point["step_time_s"] * ca.sum1(ca.sum2(places**2)) / phases.shape[1]
+        reach = _limit_reach(point, self.robot, phases, [""] * phases.shape[1])
+        indexes = {"Q_m2s": Q} if self.horizon == "step" else {}
+        return Assembly(objective=MX(0), constraints=(reach,), indexes=indexes)
 
 
 def make_rule(quadrature: Quadrature, intervals: int) -> tuple[DM, DM]:
