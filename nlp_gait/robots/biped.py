@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -31,12 +30,6 @@ class Biped:
     def joints(self) -> tuple[str, ...]:
         """Joints of both legs, the left one's first."""
         return tuple(name for side in SIDES for name in self.legs[side].joints)
-
-    @cached_property
-    def images(self) -> Mapping[str, str]:
-        """Mirror image of each joint in the other leg."""
-        left, right = (self.legs[side].joints for side in SIDES)
-        return dict(zip((*left, *right), (*right, *left), strict=True))
 
     @property
     def leg_length_m(self) -> float:

@@ -133,7 +133,7 @@ def make_humanoid(
         motors=Motors(features=parse_features(motors), robot=biped.model, joints=biped.joints),
         joints=biped.joints,
         planned=biped.joints,
-        images=tuple(biped.images[joint] for joint in biped.joints),
+        images=(*right.joints, *left.joints),
         leg_joints={side: biped.legs[foot].joints for side, foot in BOTH_FEET.items()},
         coordinates=tuple(
             Coordinate(

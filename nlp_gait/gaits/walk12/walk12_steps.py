@@ -9,6 +9,7 @@ Source:
 """
 
 from functools import cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -77,18 +78,8 @@ def compute_steps_at(
     point: NumericPoint, robot: walk12_model.PointMassBiped, *, intervals: int, zmp: walk12_model.Zmp
 ) -> Signals:
     """Compute time histories at a point of the problem, see ``compute_steps``."""
-    step_time_s, turn_rad, reach_margin_rad = (
-        float(point[name]) for name in ("step_time_s", "turn_rad", "reach_margin_rad")
-    )
-    return compute_steps(
-        robot,
-        point.x.full().ravel(),
-        step_time_s=step_time_s,
-        turn_rad=turn_rad,
-        reach_margin_rad=reach_margin_rad,
-        intervals=intervals,
-        zmp=zmp,
-    )
+    given: dict[str, Any] = {name: float(point[name]) for name in ("step_time_s", "turn_rad", "reach_margin_rad")}
+    return compute_steps(robot, point.x.full().ravel(), intervals=intervals, zmp=zmp, **given)
 
 
 def _arrange_joints(local: dict[str, Array], side: float, turn: float) -> dict[str, Array]:
