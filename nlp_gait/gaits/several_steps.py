@@ -14,8 +14,8 @@ from nlp_gait.symbolic.rotations import turn_quaternion
 
 JOINT_ARRAYS = ("q", "qd", "qdd", "tau", "q_desired", "qd_desired")
 SIDES_SWAPPED = {
-    f"{side}_{what}": f"{other}_{what}"
-    for side, other in (("left", "right"), ("right", "left"))
+    f"{side}_{what}": f"{opposite}_{what}"
+    for side, opposite in (("left", "right"), ("right", "left"))
     for what in ("foot", "bears", "force", "moment")
 }
 YAW = "feet_yaw"
@@ -41,7 +41,7 @@ def join_steps(steps: Sequence[Signals], robot: Robot, places: Array) -> Signals
         for name, values in _move(side, places[k, :3], places[k, 3], begin).items():
             arrays[name].append(values if k == 0 else values[1:])
         begin += float(step.arrays["t"][-1])
-    return replace(steps[0], arrays={name: np.concatenate(parts) for name, parts in arrays.items()})
+    return replace(steps[0], arrays={name: np.concatenate(histories) for name, histories in arrays.items()})
 
 
 def measure_step(cycle: Signals) -> float:

@@ -117,11 +117,11 @@ def _choose_held_angle(joint: Joint, posture: Mapping[str, float]) -> float:
 def _check_alike(name: str, legs: Mapping[str, Leg]) -> None:
     left, right = (legs[side] for side in SIDES)
     image = np.array([1.0, -1.0, 1.0])
-    for mine, other, joint in zip(left.points, right.points, left.joints, strict=True):
-        if math.dist(image * mine, other) > ALIKE_M:
+    for mine, opposite, joint in zip(left.points, right.points, left.joints, strict=True):
+        if math.dist(image * mine, opposite) > ALIKE_M:
             raise InputError(
                 f"robot {name!r}: legs must be mirror images to {1e3 * ALIKE_M:g} mm, joint {joint!r} is at {mine.tolist()}, its "
-                f"image at {other.tolist()}"
+                f"image at {opposite.tolist()}"
             )
 
 

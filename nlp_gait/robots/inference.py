@@ -101,9 +101,9 @@ def find_legs(robot: str, links: Links, joints: Joints, feet: Feet) -> Legs:
             f"joints each below the link where both legs meet; {hint}{remedy}"
         )
     candidates.sort(key=lambda item: (item[0], item[1].feet))
-    lowest, *others = [legs for height, legs in candidates if height < candidates[0][0] + CLEARLY_LOWER_M]
-    if others:
-        listed = "; ".join("{!r} and {!r}".format(*legs.feet) for legs in (lowest, *others))
+    lowest, *rivals = [legs for height, legs in candidates if height < candidates[0][0] + CLEARLY_LOWER_M]
+    if rivals:
+        listed = "; ".join("{!r} and {!r}".format(*legs.feet) for legs in (lowest, *rivals))
         raise RobotDataError(f"robot {robot!r}: several pairs of links may be the feet: {listed}; {remedy}")
     return lowest
 
@@ -174,27 +174,27 @@ def _find_chains(joints: Joints) -> dict[str, Chain]:
 
 def _split_chains(first: Chain, second: Chain) -> tuple[Chain, Chain]:
     shared = {placed.joint.name for placed in first} & {placed.joint.name for placed in second}
-    one, other = ([p for p in chain if p.joint.name not in shared] for chain in (first, second))
-    return one, other
+    one, opposite = ([p for p in chain if p.joint.name not in shared] for chain in (first, second))
+    return one, opposite
 
 
-def _are_mirror_chains(one: Chain, other: Chain) -> bool:
+def _are_mirror_chains(one: Chain, opposite: Chain) -> bool:
     return any(
         all(
             are_mirror_images(a.place, np.array(a.joint.axis), b.place, np.array(b.joint.axis), across)
-            for a, b in zip(one, other, strict=True)
+            for a, b in zip(one, opposite, strict=True)
         )
-        and abs(one[0].place[across] - other[0].place[across]) > LEAST_WIDTH_M
+        and abs(one[0].place[across] - opposite[0].place[across]) > LEAST_WIDTH_M
         for across in (1, 0)
     )
 
 
 def _are_arms(legs: Legs, links: Links, chains: Mapping[str, Chain]) -> bool:
     """Return whether the limbs begin above the centre of mass of all other links, at zero angles."""
-    others = [link for name, link in links.items() if name not in legs.links]
-    mass = sum(link.mass_kg for link in others)
+    remaining = [link for name, link in links.items() if name not in legs.links]
+    mass = sum(link.mass_kg for link in remaining)
     heights = {name: chain[0].place[2] for name, chain in chains.items()}
-    moment = sum(link.mass_kg * (heights.get(link.name, 0.0) + link.com_m[2]) for link in others)
+    moment = sum(link.mass_kg * (heights.get(link.name, 0.0) + link.com_m[2]) for link in remaining)
     return bool(mass > 0.0 and legs.chains[0][-1].place[2] > moment / mass)
 
 
@@ -247,8 +247,8 @@ def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[InferredS
 
 def _check_knees(robot: str, chains: tuple[Chain, Chain]) -> None:
     """Raise RobotDataError if the limits of both knees make them bend in opposite directions."""
-    one, other = (_find_knee_direction(chain) for chain in chains)
-    if float(one @ other) < 0:
+    one, opposite = (_find_knee_direction(chain) for chain in chains)
+    if float(one @ opposite) < 0:
         ranges = " and ".join(
             f"{knee.child!r} by {knee.limits_rad[0]:.3g} to {knee.limits_rad[1]:.3g} rad about {np.round(knee.axis, 3) + 0.0}"
             for knee in (chain[2].joint for chain in chains)

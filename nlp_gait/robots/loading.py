@@ -160,7 +160,7 @@ def _find_description(source: str) -> str:
     return str(partner)
 
 
-def _describe(source: str, seen: tuple[str, ...] = ()) -> RobotDescription:
+def _describe(source: str, extending: tuple[str, ...] = ()) -> RobotDescription:
     """Return what a file, and the files that it extends, say about a robot."""
     if source.endswith(MODEL_ENDINGS):
         return _read_model(source, None)
@@ -169,12 +169,12 @@ def _describe(source: str, seen: tuple[str, ...] = ()) -> RobotDescription:
     if file.extends is None:
         return description
     base_source = _resolve(file.extends, source)
-    if base_source in seen or len(seen) >= LONGEST_CHAIN:
+    if base_source in extending or len(extending) >= LONGEST_CHAIN:
         raise RobotDataError(f"robot {source!r}: 'extends' must name another robot, got {file.extends!r}")
     if base_source.endswith(MODEL_ENDINGS):
         base = _read_model(base_source, file.inertia_about)
     else:
-        base = _describe(base_source, (*seen, source))
+        base = _describe(base_source, (*extending, source))
     merged = replace(
         base.file,
         **{key: getattr(file, key) for key in REPLACED if getattr(file, key) is not None},
@@ -303,6 +303,6 @@ def _complete(
         forward = description.file.forward
         feet = infer_feet(name, legs, links, joints, feet, model.read_shapes, forward, notes)
     if count := sum("foot:" not in note for note in notes):
-        parts = f"{count} note{'s' * (count > 1)} on welded parts"
-        warn_once("robot %r: %s; see nlp-gait list --robot FILE", name, parts)
+        count_of_notes = f"{count} note{'s' * (count > 1)} on welded parts"
+        warn_once("robot %r: %s; see nlp-gait list --robot FILE", name, count_of_notes)
     return feet

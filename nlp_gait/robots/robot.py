@@ -94,8 +94,8 @@ class Motor:
 
     def __post_init__(self) -> None:
         ratings = ["gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_torque_mNm"]
-        known = ratings if self.rotor_inertia_gcm2 is None else [*ratings, "rotor_inertia_gcm2"]
-        check_numbers(f"motor {self.make!r}", self, positive=known)
+        positive = ratings if self.rotor_inertia_gcm2 is None else [*ratings, "rotor_inertia_gcm2"]
+        check_numbers(f"motor {self.make!r}", self, positive=positive)
 
     @property
     def reflected_inertia_kgm2(self) -> float | None:
@@ -200,8 +200,8 @@ class Robot:
     notes: tuple[str, ...] = ()  #: what was inferred or changed when the robot was read; a sentence each
 
     def __post_init__(self) -> None:
-        parts: tuple[Link | Joint, ...] = (*self.links.values(), *self.joints.values())
-        for piece in parts:
+        pieces: tuple[Link | Joint, ...] = (*self.links.values(), *self.joints.values())
+        for piece in pieces:
             piece.check()
         if self.root not in self.links:
             raise RobotDataError(f"robot {self.name!r}: root {self.root!r} is not a link")

@@ -46,12 +46,12 @@ class Mass(NamedTuple):
         return self._replace(com_m=rotation @ self.com_m, tensor_kgm2=rotation @ self.tensor_kgm2 @ rotation.T)
 
 
-def combine_masses(parts: Sequence[Mass]) -> Mass:
+def combine_masses(masses: Sequence[Mass]) -> Mass:
     """Return several masses in one frame as one; without any mass, the centre is that of the first."""
-    mass = sum(body.mass_kg for body in parts)
-    com = sum((body.mass_kg * body.com_m for body in parts), np.zeros(3)) / mass if mass > 0.0 else parts[0].com_m
+    mass = sum(body.mass_kg for body in masses)
+    com = sum((body.mass_kg * body.com_m for body in masses), np.zeros(3)) / mass if mass > 0.0 else masses[0].com_m
     tensor = sum(
-        (body.tensor_kgm2 + compute_point_inertia(body.mass_kg, body.com_m - com) for body in parts), np.zeros((3, 3))
+        (body.tensor_kgm2 + compute_point_inertia(body.mass_kg, body.com_m - com) for body in masses), np.zeros((3, 3))
     )
     return Mass(mass, com, tensor)
 
@@ -175,9 +175,9 @@ def weld_child(links: dict[str, Link], joints: dict[str, Joint], name: str) -> N
     joint = joints.pop(name)
     child = Mass.of_link(links.pop(joint.child)).move(np.array(joint.origin_m))
     links[joint.parent] = combine_masses([Mass.of_link(links[joint.parent]), child]).to_link(joint.parent)
-    for other in [j for j in joints.values() if j.parent == joint.child]:
-        origin_m = add_vectors(joint.origin_m, other.origin_m)
-        joints[other.name] = replace(other, parent=joint.parent, origin_m=origin_m)
+    for joint_below in [j for j in joints.values() if j.parent == joint.child]:
+        origin_m = add_vectors(joint.origin_m, joint_below.origin_m)
+        joints[joint_below.name] = replace(joint_below, parent=joint.parent, origin_m=origin_m)
 
 
 def turn_parts(links: dict[str, Link], joints: dict[str, Joint], rotation: Array) -> None:
@@ -212,7 +212,7 @@ def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:
         turn, link = turns[joint.child], links[joint.child]
         if not np.array_equal(turn, np.eye(3)):
             links[joint.child] = Mass.of_link(link).turn(turn).to_link(link.name)
-        waiting += [other for other in robot.joints.values() if other.parent == joint.child]
+        waiting += [joint_below for joint_below in robot.joints.values() if joint_below.parent == joint.child]
     return replace(robot, links=links, joints={name: joints[name] for name in robot.joints})
 
 
@@ -294,5 +294,5 @@ def mirror_sign(robot: Robot, joint: str, image: str) -> float:
 
     A reflection at the plane y = 0 turns an axis (x, y, z) of rotation into (-x, y, -z). Raises UnknownNameError.
     """
-    (x, y, z), other = robot.joint(joint).axis, robot.joint(image).axis
-    return 1.0 if -x * other[0] + y * other[1] - z * other[2] > 0.0 else -1.0
+    (x, y, z), image_axis = robot.joint(joint).axis, robot.joint(image).axis
+    return 1.0 if -x * image_axis[0] + y * image_axis[1] - z * image_axis[2] > 0.0 else -1.0

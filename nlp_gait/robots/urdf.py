@@ -148,10 +148,10 @@ def _read_xml(path: str) -> Any:
         raise ValueError("a URDF must not have a DOCTYPE or entities; remove them")
     if robot.tag != "robot":
         raise ValueError(f"it is not a URDF of a robot: it begins with <{robot.tag}>, not <robot>")
-    parts = robot.findall("link") + robot.findall("joint")
-    if len(parts) > MOST_PARTS:
-        raise ValueError(f"it has {len(parts)} links and joints, more than {MOST_PARTS}; simplify the file")
-    for element in (robot, *parts):
+    elements = robot.findall("link") + robot.findall("joint")
+    if len(elements) > MOST_PARTS:
+        raise ValueError(f"it has {len(elements)} links and joints, more than {MOST_PARTS}; simplify the file")
+    for element in (robot, *elements):
         _check_attributes(element, path)
     for mesh in filter(None, (find_mesh(element.get("filename", ""), Path(path)) for element in robot.iter("mesh"))):
         protect_input(mesh)
@@ -244,10 +244,10 @@ def _read_pose(element: Any) -> Array:
 
 def _find_part(element: Any, tag: str, *, needed: bool = False) -> Any:
     """Return the only element of a tag in another one, None without one; raises ValueError for several, or a needed one."""
-    parts = element.findall(tag)
-    if len(parts) > 1 or (needed and not parts):
-        raise ValueError(f"{_name_owner(element)}: <{element.tag}> must have one <{tag}>, got {len(parts)}")
-    return parts[0] if parts else None
+    children = element.findall(tag)
+    if len(children) > 1 or (needed and not children):
+        raise ValueError(f"{_name_owner(element)}: <{element.tag}> must have one <{tag}>, got {len(children)}")
+    return children[0] if children else None
 
 
 def _read_text(element: Any, key: str) -> str:

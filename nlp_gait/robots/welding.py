@@ -61,7 +61,7 @@ def join_frames(
     masses: dict[str, list[Mass]] = {}
     for link, frame in frames.items():
         masses.setdefault(carriers[link], []).append(frame.mass)
-    links = {link: combine_masses(parts).move(-frames[link].origin_m).to_link(link) for link, parts in masses.items()}
+    links = {link: combine_masses(pieces).move(-frames[link].origin_m).to_link(link) for link, pieces in masses.items()}
     joints = {}
     for joint in turning:
         parent = carriers[joint.parent]
@@ -91,10 +91,10 @@ def weld_faults(links: Links, joints: Joints, legs: Collection[str], notes: list
         weld_child(links, joints, name)
 
 
-def find_faults(parts: Mapping[str, Link] | Mapping[str, Joint]) -> dict[str, RobotDataError]:
+def find_faults(pieces: Mapping[str, Link] | Mapping[str, Joint]) -> dict[str, RobotDataError]:
     """Return what is wrong with links or joints, by name."""
     faults = {}
-    for name, piece in parts.items():
+    for name, piece in pieces.items():
         try:
             piece.check()
         except RobotDataError as fault:

@@ -39,8 +39,8 @@ class SwitchState(NamedTuple):
 
     hip: SX
     hip_velocity: SX
-    others: SX
-    others_rate: SX
+    angles: SX
+    angle_rates: SX
 
 
 class PhaseMotion(NamedTuple):
@@ -121,7 +121,7 @@ def make_cycle_planners(body: Body, inelastic: bool = False) -> dict[Support, Pl
         place = mirror * hip + vertcat(step, 0, 0)  # the mirror image of lift-off, a step further
         if inelastic:
             velocity_after, rates_after = read_rates(point, AFTER, body.coordinates)
-            touch_down = touch_down._replace(hip_velocity=velocity_after, others_rate=rates_after)
+            touch_down = touch_down._replace(hip_velocity=velocity_after, angle_rates=rates_after)
         end = SwitchState(place, mirror * velocity, images * angles, images * rates)
         return PhaseMotion(touch_down, end, read_duration(point, Support.DOUBLE), step, step)
 
@@ -173,4 +173,4 @@ def interpolate_states(
         return tuple(cubic(a, b, va, vb, duration, phase) for a, b, va, vb in columns)
 
     hip = curves(start.hip, end.hip, start.hip_velocity, end.hip_velocity)
-    return stack(*hip), curves(start.others, end.others, start.others_rate, end.others_rate)
+    return stack(*hip), curves(start.angles, end.angles, start.angle_rates, end.angle_rates)

@@ -281,14 +281,14 @@ class Phase:
         outputs = [*_stack_motions(plan, self.body.joints), ca.vertcat(*world)]
         outputs += [self.measure(name, plan) for name in of_motion]
         motion = ca.Function("motion", inputs, outputs)
-        parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
+        orders = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
         given = SX.sym("world", ca.vertcat(*world).shape[0])
         ends = np.cumsum([0, *(vector.shape[0] for vector in world)]).tolist()
         hip, left, right, yaw = ca.vertsplit(given, ends)
-        moved = {name: Motion(*(order[i] for order in parts)) for i, name in enumerate(self.moving)}
+        moved = {name: Motion(*(order[i] for order in orders)) for i, name in enumerate(self.moving)}
         joints = {**self._exact_plan[1].joints, **moved}
         now = self.loads(Instant(joints=joints, hip=hip, ankles={"L": left, "R": right}, yaw=yaw))
-        loads = ca.Function("loads", [*parts, given], [self.measure(name, now) for name in of_loads])
+        loads = ca.Function("loads", [*orders, given], [self.measure(name, now) for name in of_loads])
         return Stages(motion, loads, of_motion, of_loads, tuple(names))
 
     def _evaluate_stages(self, stages: "Stages", point: NumericPoint) -> dict[str, MX]:
@@ -327,7 +327,7 @@ class Phase:
             ]
             for point in ats
         ]
-        inputs = points[0] if len(ats) == 1 else [ca.horzcat(*parts) for parts in zip(*points, strict=True)]
+        inputs = points[0] if len(ats) == 1 else [ca.horzcat(*blocks) for blocks in zip(*points, strict=True)]
         return list(function.map(n * len(ats)).call([*columns, *inputs]))
 
     def _differences(self, q: MX, point: Point) -> tuple[MX, MX]:

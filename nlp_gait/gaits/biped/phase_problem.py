@@ -123,14 +123,14 @@ def add_robot(
 
 
 def make_start_within_reach(
-    variables: Sequence[Variable], known: Sequence[str], reach: Callable[[Point], MX], start: Start | None
+    variables: Sequence[Variable], names_read: Sequence[str], reach: Callable[[Point], MX], start: Start | None
 ) -> Start:
     """Return start points at which all knees are within reach, or the nearest of some: beyond reach there is no slope back.
 
-    Besides the margin on the reach, the motion reads the parameters ``known``; ``reach`` gives the cosines of the knees at a
+    Besides the margin on the reach, the motion reads the parameters ``names_read``; ``reach`` gives the cosines of the knees at a
     point. Start points to choose from are those of ``start``, or any, within both the bounds and those of ``variables``.
     """
-    read = (limits.REACH_MARGIN, *known)
+    read = (limits.REACH_MARGIN, *names_read)
     names = [variable.name for variable in variables]
 
     @cache

@@ -115,7 +115,7 @@ def make_free_single_support_phase(body: NaoBody, step_m: float, trajectory: Tra
         support=support,
         curves={YAW_PITCH: YAW_PITCHES, **{name: (name,) for name in CURVES[1:]}},
         held=HELD_ARM_ANGLES,
-        others=OTHERS,
+        other_joints=OTHERS,
         paper=paper,
         splines=splines,
         kinks=splines.kinks,

@@ -33,7 +33,7 @@ class JointPhase(Phase):
     support: tuple[float, float, float]  # (3,) the left ankle, which stands [m]
     curves: Mapping[str, Sequence[str]]  # joints that each curve moves
     held: Mapping[str, float]  # angles of the joints that do not move [rad]
-    others: tuple[str, ...] = ()  # joints whose angles are the quantity ``other_angle`` (k, N + 1) [rad]
+    other_joints: tuple[str, ...] = ()  # joints whose angles are the quantity ``other_angle`` (k, N + 1) [rad]
     plan: Planner = field(init=False)
 
     @abstractmethod
@@ -59,7 +59,7 @@ class JointPhase(Phase):
             quantities={
                 **instant.quantities,
                 "hip_rate": ca.jtimes(instant.hip, v[:count], v[count : 2 * count]),
-                "other_angle": ca.vertcat(*(joints[name].position for name in self.others)),
+                "other_angle": ca.vertcat(*(joints[name].position for name in self.other_joints)),
             }
         )
 
@@ -83,7 +83,7 @@ class JointPhase(Phase):
             "miss": motions[:0, :],
             **{key: _stack(rows, moving) for key, rows in (("q", q), ("qd", qd), ("qdd", qdd))},
             **{key: _stack(rows, joints) for key, rows in (("all_q", q), ("all_qd", qd), ("all_qdd", qdd))},
-            "other_angle": _stack(q, self.others),
+            "other_angle": _stack(q, self.other_joints),
         }
         mapped = [name for name in names if name not in {*values, "power"}]
         outputs = [self.measure(name, self._exact_now) for name in mapped]

@@ -110,7 +110,7 @@ class Climb:
     @cached_property
     def steps(self) -> dict[ClimbPart, IdealStep]:
         """The distinct steps."""
-        return {part: make_ideal_step(self.intervals, part.behind, part.ahead) for part in PARTS}
+        return {stride: make_ideal_step(self.intervals, stride.behind, stride.ahead) for stride in PARTS}
 
     @property
     def sequence(self) -> tuple[ClimbPart, ...]:
@@ -121,38 +121,40 @@ class Climb:
     def variables(self) -> tuple[Variable, ...]:
         """Variables of all distinct steps."""
         return tuple(
-            replace(variable, name=f"{part.name}_{variable.name}")
-            for part, step in self.steps.items()
+            replace(variable, name=f"{stride.name}_{variable.name}")
+            for stride, step in self.steps.items()
             for variable in step.layout.variables
         )
 
     def _split(self, x: MX | Array) -> dict[ClimbPart, MX | Array]:
         """Return the steps' variables."""
         size = len(self.variables) // len(PARTS)
-        return {part: x[i * size : (i + 1) * size] for i, part in enumerate(PARTS)}
+        return {stride: x[i * size : (i + 1) * size] for i, stride in enumerate(PARTS)}
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
         """Return the effort of the whole climb, and the rows of its distinct steps and of the joints between them."""
-        blocks = {part: self.steps[part].layout.split(replace(point, x=x)) for part, x in self._split(point.x).items()}
+        blocks = {
+            stride: self.steps[stride].layout.split(replace(point, x=x)) for stride, x in self._split(point.x).items()
+        }
         effort, energy, peak, rows = MX(0), MX(0), MX(0), list[Constraint]()
-        for part, x in blocks.items():
-            objective, loads, indexes = self.steps[part].load(x, point)
-            occurs = self.sequence.count(part)
+        for stride, x in blocks.items():
+            objective, loads, indexes = self.steps[stride].load(x, point)
+            occurs = self.sequence.count(stride)
             effort += occurs * objective
             energy += occurs * indexes["energy_J"]
             peak = ca.fmax(peak, indexes["peak_torque_Nm"])
-            limits = (*self._limit_step(part, x, point), *loads)
-            rows += [replace(row, name=f"{part.name}_{row.name}") for row in limits]
+            limits = (*self._limit_step(stride, x, point), *loads)
+            rows += [replace(row, name=f"{stride.name}_{row.name}") for row in limits]
         for before, after in JOINTS_BETWEEN:
             rows.append(self._join(before, after, blocks, point))
         return Assembly(objective=effort, constraints=tuple(rows), indexes={"energy_J": energy, "peak_torque_Nm": peak})
 
-    def _limit_step(self, part: ClimbPart, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
+    def _limit_step(self, stride: ClimbPart, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
         """Return rows of a step's motion, feet, shanks and standing ends."""
-        step, n = self.steps[part], self.intervals
+        step, n = self.steps[stride], self.intervals
         q, v = x["angle"], x["rate"]
         size = ca.repmat(ca.vertcat(*stair.read_stair(point)), 1, n + 1)
-        heights, gaps, centre, ends = _make_instant(part.stair_kind).map(n + 1)(q, v, size)
+        heights, gaps, centre, ends = _make_instant(stride.stair_kind).map(n + 1)(q, v, size)
         lift, swing = step.toe_off, range(step.toe_off + 1, n + 1)
         # The clearance grows and falls with the swing.
         share = np.array([min(k - lift, n - k) / (n - lift) / RAMP for k in swing]).clip(0.0, 1.0)
@@ -176,12 +178,12 @@ class Climb:
                 lower=ca.vec(least) - rounding,
                 columns=swing,
             ),
-            stair.limit_shanks(gaps, part.stair_kind),
+            stair.limit_shanks(gaps, stride.stair_kind),
         ]
-        for instant, stands in ((0, not part.behind), (n, not part.ahead)):
+        for instant, stands in ((0, not stride.behind), (n, not stride.ahead)):
             if stands:
-                rest = make_equal_rows("rest", ends[2:4, instant], AXES, (instant,), "m/s", 0.1)
-                rows += [rest, replace(stair.limit_stance_zmp(point, centre[:, instant]), name="standing")]
+                at_rest = make_equal_rows("rest", ends[2:4, instant], AXES, (instant,), "m/s", 0.1)
+                rows += [at_rest, replace(stair.limit_stance_zmp(point, centre[:, instant]), name="standing")]
         return tuple(rows)
 
     def _join(
@@ -191,8 +193,8 @@ class Climb:
         size = ca.vertcat(*stair.read_stair(point))
         torso = MOVING.index("UH")
         (q0, v0), (q1, v1) = (
-            (blocks[part]["angle"][:, k], blocks[part]["rate"][:, k])
-            for part, k in ((before, self.intervals), (after, 0))
+            (blocks[stride]["angle"][:, k], blocks[stride]["rate"][:, k])
+            for stride, k in ((before, self.intervals), (after, 0))
         )
         end, start = (_make_instant("next")(q, v, size)[3] for q, v in ((q0, v0), (q1, v1)))
         jumps = ca.vertcat(start[:2] + size - end[:2], start[2:4] - end[2:4], q1[torso] - q0[torso])
@@ -203,20 +205,20 @@ class Climb:
         """Return a smooth motion of hip and swing ankle with noise, and a part of the load on the rear foot."""
         tread = values["stair_length_m"] / 2
         size, duration = np.array([tread, values["rise_run_ratio"] * tread]), values["step_time_s"]
-        return np.concatenate([self._start_step(part, size, duration, rng) for part in PARTS])
+        return np.concatenate([self._start_step(stride, size, duration, rng) for stride in PARTS])
 
-    def _start_step(self, part: ClimbPart, size: Array, duration: float, rng: np.random.Generator) -> Array:
-        step, n = self.steps[part], self.intervals
+    def _start_step(self, stride: ClimbPart, size: Array, duration: float, rng: np.random.Generator) -> Array:
+        step, n = self.steps[stride], self.intervals
         s = np.linspace(0.0, 1.0, n + 1)[:, None]
         smooth = s**2 * (3 - 2 * s)
         between = np.array(HIP_BETWEEN)
-        first, last = (between - size if part.behind else HIP_STANDING), (between if part.ahead else HIP_STANDING)
+        first, last = (between - size if stride.behind else HIP_STANDING), (between if stride.ahead else HIP_STANDING)
         hip = first + smooth * (np.array(last) - first)
         swing = np.clip((s[:, 0] - step.toe_off / n) / (1 - step.toe_off / n), 0.0, 1.0)
-        way = (part.behind + part.ahead) * size
+        way = (stride.behind + stride.ahead) * size
         late, early = (np.interp(swing, ends, (0.0, 1.0)) for ends in ((0.25, 1.0), (0.0, 0.6)))
         late, early = (share**2 * (3 - 2 * share) for share in (late, early))
-        ankle = np.column_stack([late * way[0], early * way[1] + LIFT * np.sin(np.pi * swing)]) - part.behind * size
+        ankle = np.column_stack([late * way[0], early * way[1] + LIFT * np.sin(np.pi * swing)]) - stride.behind * size
         still = np.zeros(n + 1)
         legs = [*_reach(ankle - hip), *_reach(-hip)]
         angle = np.stack([*legs, still + TORSO, still, still])
@@ -227,12 +229,12 @@ class Climb:
         """Return the whole climb on a dense grid, with every second step mirrored."""
         blocks = self._split(point.x.full().ravel())
         motions = {
-            part: make_signals(step.refine(step.layout.values(blocks[part]), float(point["step_time_s"])), 0.0)
-            for part, step in self.steps.items()
+            stride: make_signals(step.refine(step.layout.values(blocks[stride]), float(point["step_time_s"])), 0.0)
+            for stride, step in self.steps.items()
         }
         tread, rise = measure_stair(point)
         places = np.outer(np.arange(len(self.sequence)), [tread, 0.0, rise, 0.0])
-        return join_steps([motions[part] for part in self.sequence], make_rigid_bodies(), places)
+        return join_steps([motions[stride] for stride in self.sequence], make_rigid_bodies(), places)
 
     def list_treads(self, point: NumericPoint) -> tuple[Tread, ...]:
         """Return the stairs ahead of the stance ankle of the first step."""

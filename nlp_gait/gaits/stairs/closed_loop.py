@@ -68,7 +68,7 @@ ANGLES: Mapping[Coordinates, Mapping[str, Mapping[str, int]]] = {
 
 def measure_joints(coordinates: Coordinates) -> DM:
     """Return the matrix (9, 9) from link angles to the controlled angles."""
-    return DM([[parts.get(link, 0) for link in biped.LINKS] for parts in ANGLES[coordinates].values()])
+    return DM([[terms.get(link, 0) for link in biped.LINKS] for terms in ANGLES[coordinates].values()])
 
 
 class Rollout(NamedTuple):
@@ -151,27 +151,27 @@ class ClosedLoop:
     @cached_property
     def step(self) -> ca.Function:
         """Function of (state (18,), given, tuned) to the state one quantum later."""
-        state, inputs, parts = self._symbols()
-        following = quantised.advance(state, solve_definite(*self._equations(state, parts)), QUANTUM)
+        state, inputs, named = self._symbols()
+        following = quantised.advance(state, solve_definite(*self._equations(state, named)), QUANTUM)
         return ca.Function(
             "step", [ca.vertcat(*state), *inputs], [ca.cse(ca.vertcat(*following))], {"is_diff_in": [True, False, True]}
         )
 
-    def _equations(self, state: QuantisedState, parts: Mapping[str, Any]) -> Equations:
+    def _equations(self, state: QuantisedState, named: Mapping[str, Any]) -> Equations:
         """Return the equations of the acceleration within one quantum."""
         q, v = state
-        place, speed, push = self.locate_base(parts["hip"])
+        place, speed, push = self.locate_base(named["hip"])
         places = biped.locate_points(q, place, self.base_point)
         motion = biped.make_dynamics(q, v, q, self.base_point)
-        stair = Stair(parts["size"][0], parts["size"][1])
+        stair = Stair(named["size"][0], named["size"][1])
 
         def touch(point: SX) -> Contact:
             height = point[1] - compute_stair_height(point[0], stair, SETBACK, EDGE_WIDTH)
             return Contact(height, ca.jacobian(point[1], q).T, ca.jacobian(point[0], q).T, speed[::-1])
 
         contacts = [touch(places[name]) for name in CONTACTS if name != self.base_point]
-        control, aim, ground = parts["control"], parts["desired"], Ground(*ca.vertsplit(parts["ground"]))
-        disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1)
+        control, aim, ground = named["control"], named["desired"], Ground(*ca.vertsplit(named["ground"]))
+        disturbance = ca.repmat(named["disturbance"] * ca.sin(2 * named["time"]), N, 1)
         if self.base == "hip":  # which accelerates the links
             centres = biped.locate_centres(places)
             momentum = sum((biped.get_rod(link).mass_kg * centre for link, centre in centres.items()), SX(2, 1))
@@ -181,22 +181,22 @@ class ClosedLoop:
     @cached_property
     def outcome(self) -> ca.Function:
         """Function of (state, next state, given, tuned) to torques (9,) and ZMP, with a quantum's mean acceleration."""
-        state, inputs, parts = self._symbols()
+        state, inputs, named = self._symbols()
         following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
         G = biped.make_dynamics(state.q, state.v, state.q, self.base_point).G
-        torque = quantised.controller_torque(parts["control"], parts["desired"], following, G)
+        torque = quantised.controller_torque(named["control"], named["desired"], following, G)
 
         acceleration = (following.v - state.v) / QUANTUM
-        place, _, push = self.locate_base(parts["hip"])
+        place, _, push = self.locate_base(named["hip"])
         places = biped.locate_points(state.q, place, self.base_point)
         centres = biped.locate_centres(places)
         accelerations = {link: self._accelerate(centre, state, acceleration) + push for link, centre in centres.items()}
         forces, spins = biped.compute_pushes(accelerations, acceleration)
         pull, weight = ca.vertsplit(sum(forces.values(), SX(2, 1)))
         moment = sum((biped.compute_moment(centres[link], forces[link]) for link in biped.LINKS), SX(0))
-        moment += parts["spin"] * sum(spins.values(), SX(0))
+        moment += named["spin"] * sum(spins.values(), SX(0))
         least = biped.LEAST_LOAD * biped.load_toe_foot_biped().mass_kg * biped.GRAVITY
-        zmp = moment / ca.fmax(weight - parts["slope"] * pull, least)  # (eq. 49)
+        zmp = moment / ca.fmax(weight - named["slope"] * pull, least)  # (eq. 49)
         return ca.Function(
             "outcome",
             [ca.vertcat(*state), ca.vertcat(*following), *inputs],
@@ -213,20 +213,20 @@ class ClosedLoop:
         """Return the state, the inputs given and tuned, and their parts by name, with controller and desired state."""
         given, tuned = SX.sym("given", sum(GIVEN.values())), SX.sym("tuned", 3)
         ends = [0, *np.cumsum(list(GIVEN.values())).tolist()]
-        parts: dict[str, Any] = dict(zip(GIVEN, ca.vertsplit(given, ends), strict=True))
+        named: dict[str, Any] = dict(zip(GIVEN, ca.vertsplit(given, ends), strict=True))
         kp, kd, torso = ca.vertsplit(tuned)
-        aim = parts.pop("aim")
-        share = parts.pop("gravity_share")
-        parts["control"] = quantised.Controller(ca.repmat(kp, N, 1), ca.repmat(kd, N, 1), share, self.joints)
-        parts["desired"] = QuantisedState(ca.vertcat(aim[:TORSO], torso, aim[TORSO + 1 : N]), aim[N:])
-        return QuantisedState(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
+        aim = named.pop("aim")
+        share = named.pop("gravity_share")
+        named["control"] = quantised.Controller(ca.repmat(kp, N, 1), ca.repmat(kd, N, 1), share, self.joints)
+        named["desired"] = QuantisedState(ca.vertcat(aim[:TORSO], torso, aim[TORSO + 1 : N]), aim[N:])
+        return QuantisedState(SX.sym("q", N), SX.sym("v", N)), [given, tuned], named
 
 
 def _make_desired(ops: Nonsmooth) -> ca.Function:
     """Return the function of (time, governing parameters, stair, reach margin) to the desired state and the hip's (22,)."""
     (s, passing, *constants), plan, _, step = make_step_symbols(ops)
     given = ca.vertcat(*constants)
-    angles = (ca.vertcat(part, SX(2, 1)) for part in step.q[:2])
+    angles = (ca.vertcat(order, SX(2, 1)) for order in step.q[:2])
     pose = ca.Function("pose", [s, passing, given], [*angles, step.hip.position, step.hip.velocity])
     time = SX.sym("time")
     starts = ca.vertcat(0, ca.cumsum(plan.durations)[:3])

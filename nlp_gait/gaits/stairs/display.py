@@ -52,8 +52,8 @@ def make_rigid_bodies() -> Robot:
     joints, feet, toes = {}, {}, {}
     for letter, (side, _) in SIDES.items():
         parent, origin = TORSO, (0.0, 0.0, 0.0)
-        for joint, (part, paper_name) in LEG.items():
-            link, name = biped.get_rod(paper_name), f"{side} {part}"
+        for joint, (segment, paper_name) in LEG.items():
+            link, name = biped.get_rod(paper_name), f"{side} {segment}"
             along: Vector = (0.0, 0.0, -1.0) if joint in ("Hip", "Knee") else (1.0, 0.0, 0.0)
             links[name] = _link(name, link, along)
             joints[f"{letter}{joint}"] = Joint(
@@ -68,7 +68,7 @@ def make_rigid_bodies() -> Robot:
             )
             parent, origin = name, (link.length_m * along[0], link.length_m * along[1], link.length_m * along[2])
         feet[side], toes[side] = (
-            _make_plate(f"{side} {part}", biped.get_rod(of).length_m) for part, of in (LEG["Ankle"], LEG["Toe"])
+            _make_plate(f"{side} {segment}", biped.get_rod(of).length_m) for segment, of in (LEG["Ankle"], LEG["Toe"])
         )
     return Robot(
         name=paper.name,
@@ -114,7 +114,7 @@ def _compute_turns(q: Array, share: float) -> dict[str, Array]:
 
 def _link(name: str, rod: biped.PlanarLink, along: Vector) -> Link:
     """Return a rod from its frame's origin along an axis; equal inertia about all axes, as it turns about one only."""
-    x, y, z = (rod.length_m / 2 * part for part in along)
+    x, y, z = (rod.length_m / 2 * component for component in along)
     moment = rod.inertia_kgm2
     tensor = (moment, moment, moment, 0.0, 0.0, 0.0)
     return Link(name=name, mass_kg=rod.mass_kg, com_m=(x, y, z), inertia_com_kgm2=tensor)
@@ -185,9 +185,9 @@ def make_standing_step(
 ) -> StepMotion:
     """Return a step over the flat stance foot from angles q (T, 7) [rad] and forces (T, 2) [N] on rear toe and sole joint."""
     loads = biped.make_loads("T", "S").map(len(t))(q.T, qd.T, qdd.T, toe.T, sole.T)
-    torque, stance, pressure = (np.array(part).T for part in loads)
+    torque, stance, pressure = (np.array(values).T for values in loads)
     flat = np.zeros((len(t), len(biped.LINKS) - len(biped.MOVING)))
-    q, qd, qdd = (np.hstack([part, flat]) for part in (q, qd, qdd))
+    q, qd, qdd = (np.hstack([values, flat]) for values in (q, qd, qdd))
     places = _locate_points(q)
     carried = stance[:, 1] * pressure[:, 0] + toe[:, 1] * places["T"][:, 0] + sole[:, 1] * places["S"][:, 0]
     whole = stance[:, 1] + toe[:, 1] + sole[:, 1]
@@ -215,7 +215,7 @@ def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, dou
 
 def make_signals(step: StepMotion, rise: float) -> Signals:
     """Return time histories of the robot's joints; the stance foot stands ``rise`` above the floor [m]."""
-    at = _locate_points(step.q)
+    places = _locate_points(step.q)
     lean = _compute_turns(step.q, 1.0)["UH"]  # from upright, forward
     still = np.zeros_like(lean)
     rear = (step.t <= step.double_support_s) | (step.t == step.t[-1])  # it lands at the end
@@ -231,10 +231,10 @@ def make_signals(step: StepMotion, rise: float) -> Signals:
         "qdd": compute_joint_angles(step.qdd, rates=True),
         "tau": step.tau,
         "zmp": np.column_stack([step.pressure, still]),
-        "hip": lift(at["H"]),
+        "hip": lift(places["H"]),
         "attitude": np.column_stack([np.cos(lean / 2), still, np.sin(lean / 2), still]),
-        "left_foot": lift(at["A'"]),
-        "right_foot": lift(at["A"]),
+        "left_foot": lift(places["A'"]),
+        "right_foot": lift(places["A"]),
         "left_bears": np.ones((len(step.t), 1)),
         "right_bears": rear[:, None].astype(float),
     }
@@ -261,7 +261,7 @@ def measure_stair(point: NumericPoint | Mapping[str, float]) -> tuple[float, flo
 def _locate_points(q: Array, stance_ankle: Array | None = None) -> dict[str, Array]:
     """Return the places (T, 2) of joints and ends by name [m], for angles (T, 9); the stance ankle is by default at zero."""
     angles, ankle = SX.sym("q", len(biped.LINKS)), SX.sym("ankle", 2)
-    found = biped.locate_points(angles, ankle)
+    points = biped.locate_points(angles, ankle)
     base = np.zeros((len(q), 2)) if stance_ankle is None else stance_ankle
-    places = ca.Function("points", [angles, ankle], list(found.values())).map(len(q))(q.T, base.T)
-    return {name: np.array(place.full().T) for name, place in zip(found, places, strict=True)}
+    places = ca.Function("points", [angles, ankle], list(points.values())).map(len(q))(q.T, base.T)
+    return {name: np.array(place.full().T) for name, place in zip(points, places, strict=True)}

@@ -130,12 +130,12 @@ class IdealStep:
         x = self.layout.split(point)
         motion, n = self.limit_motion(x, point), self.intervals
         torso = x["rate"][MOVING.index("UH"), 1:n]
-        rest = make_equal_rows("rest", x["rate"][:, [0, n]], MOVING, (0, n), "rad/s", 1.0)
+        at_rest = make_equal_rows("rest", x["rate"][:, [0, n]], MOVING, (0, n), "rad/s", 1.0)
         still = make_equal_rows("torso_still", torso, ("UH",), range(1, n), "rad/s", 1.0)
         objective, loads, indexes = self.load(x, point)
         return Assembly(
             objective=objective,
-            constraints=(*motion, rest, still, *self.place_feet(x, point), *self._clear_stair(x, point), *loads),
+            constraints=(*motion, at_rest, still, *self.place_feet(x, point), *self._clear_stair(x, point), *loads),
             indexes=indexes,
         )
 
@@ -165,8 +165,10 @@ class IdealStep:
         """Return time histories; values of intervals are those of their first instants, the last instant repeats the last one."""
         values = self.layout.values(point.x.full().ravel())
         symbolic = self.compute_loads({name: MX(DM(value)) for name, value in values.items()})
-        intervals = [*(np.array(ca.evalf(part)) for part in symbolic), values["acceleration"]]
-        torque, force, pressure, acceleration = (np.concatenate([part, part[:, -1:]], axis=1).T for part in intervals)
+        intervals = [*(np.array(ca.evalf(columns)) for columns in symbolic), values["acceleration"]]
+        torque, force, pressure, acceleration = (
+            np.concatenate([columns, columns[:, -1:]], axis=1).T for columns in intervals
+        )
         return Signals(
             joints=JOINTS,
             arrays={

@@ -120,8 +120,8 @@ class PlannedStep:
         """Number of the first sample of each phase."""
         return tuple(i * (self.per_phase + 1) for i in range(len(PHASES)))
 
-    def _map_samples(self, function: ca.Function, point: Point, s: MX | DM, passing: Array, *more: MX) -> MX:
-        constants = (collect_governing(point), ca.vertcat(*read_stair(point)), point["reach_margin"], *more)
+    def _map_samples(self, function: ca.Function, point: Point, s: MX | DM, passing: Array, *further: MX) -> MX:
+        constants = (collect_governing(point), ca.vertcat(*read_stair(point)), point["reach_margin"], *further)
         columns = s.shape[1]
         repeated = (ca.repmat(value, 1, columns) for value in constants)
         return function.map(columns)(s, DM(passing), *repeated)
@@ -130,14 +130,14 @@ class PlannedStep:
 def make_grid_at(phase: int, fractions: MX | DM) -> tuple[MX | DM, Array]:
     """Return the grid of ``make_phase_grid`` at fractions (1, k) of one phase."""
     k = int(fractions.shape[1])
-    parts: list[MX | DM] = [DM.ones(1, k) * float(j < phase) for j in range(len(PHASES))]
-    parts[phase] = fractions
-    return ca.vertcat(*parts), np.repeat(np.eye(len(PHASES))[:, [phase]], k, axis=1)
+    shares: list[MX | DM] = [DM.ones(1, k) * float(j < phase) for j in range(len(PHASES))]
+    shares[phase] = fractions
+    return ca.vertcat(*shares), np.repeat(np.eye(len(PHASES))[:, [phase]], k, axis=1)
 
 
 def make_phase_grid(fractions: list[Array]) -> tuple[DM, Array]:
     """Return s (4, m) of all phases from the fractions to sample in each, and the current phase as columns (4, m) of 0 and 1."""
-    s, passing = zip(*(make_grid_at(i, DM(part).T) for i, part in enumerate(fractions)), strict=True)
+    s, passing = zip(*(make_grid_at(i, DM(row).T) for i, row in enumerate(fractions)), strict=True)
     return ca.horzcat(*s), np.hstack(passing)
 
 
@@ -181,7 +181,7 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     Both feet share the load so that the stance foot carries what it can with its centre of pressure between its contact points;
     the forces on them are parallel.
     """
-    q, v, a = (ca.vertcat(part, SX(2, 1)) for part in step.q)  # the stance foot is flat
+    q, v, a = (ca.vertcat(order, SX(2, 1)) for order in step.q)  # the stance foot is flat
     place = biped.locate_points(q, SX(2, 1))
     middles, accelerations = biped.locate_centres(place), _accelerate_centres(Motion(q, v, a))
     push, turn = biped.compute_pushes(accelerations, a)
@@ -218,7 +218,7 @@ def _accelerate_centres(q: Motion) -> dict[str, SX]:
     """Return the accelerations (2,) of the links' centres [m/s^2] from angles (9,)."""
 
     def acceleration(link: str) -> SX:
-        angle, rate, change = (part[biped.LINKS.index(link)] for part in q)
+        angle, rate, change = (order[biped.LINKS.index(link)] for order in q)
         normal = biped.compute_direction(link, angle + ca.pi / 2)
         return biped.get_rod(link).length_m * (change * normal - rate**2 * biped.compute_direction(link, angle))
 

@@ -241,8 +241,8 @@ def compute_posture(plan: StairPlan, stair: Stair[SX], s: SX, rates: SX, margin:
 def _solve_leg(at_hip: Motion, at_ankle: Motion, margin: SX, ops: Nonsmooth) -> tuple[Motion, SX]:
     """Absolute angles of thigh and shank, and the cosine of the knee."""
     forward_up = (ankle_part - hip_part for ankle_part, hip_part in zip(at_ankle, at_hip, strict=True))
-    hip_to_ankle = Motion(*(ca.vertcat(part[0], 0, part[1]) for part in forward_up))
+    hip_to_ankle = Motion(*(ca.vertcat(order[0], 0, order[1]) for order in forward_up))
     leg = leg_angles(hip_to_ankle, get_rod("HK").length_m, get_rod("KA").length_m, margin, ops)
-    _, pitch, knee, _, _ = (Motion(*(part[i] for part in leg.joints)) for i in range(5))
+    _, pitch, knee, _, _ = (Motion(*(order[i] for order in leg.joints)) for i in range(5))
     upright = constant_motion(ca.pi / 2)  # a leg that hangs down
     return stack(add_motions(pitch, upright), add_motions(add_motions(pitch, knee), upright)), leg.reach

@@ -147,7 +147,7 @@ class TrackedStep:
         errors = ca.diagcat(loop.joints, loop.joints) @ (rollout.state - rollout.desired)
         power = rollout.torque * (loop.joints @ rollout.state[closed_loop.N :, :])
         rear, front = compute_support(point, loop)
-        tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
+        tracking, effort = (ca.sum1(ops.abs(ca.vec(values))) / quanta for values in (errors, power))
         instants = range(1, quanta + 1)
         constraints = [  # (Algorithm 3)
             stair.make_rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants)
@@ -174,10 +174,10 @@ class TrackedStep:
     def compute_signals(self, point: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
         loop, rollout = self.loop, self.roll_out(point, Exact())
-        parts = (*rollout[:4], loop.find_stance_ankle(rollout))
-        desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
+        histories = (*rollout[:4], loop.find_stance_ankle(rollout))
+        desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(history)).T for history in histories)
         joints = loop.joints.full().T
-        (q, qd), (q_desired, qd_desired) = (np.split(part, 2, axis=1) for part in (state, desired))
+        (q, qd), (q_desired, qd_desired) = (np.split(history, 2, axis=1) for history in (state, desired))
         links = {"q": q, "qd": qd, "q_desired": q_desired, "qd_desired": qd_desired}
         t = np.linspace(closed_loop.QUANTUM, loop.quanta * closed_loop.QUANTUM, loop.quanta)
         arrays = {"t": t, **{name: value @ joints for name, value in links.items()}, "link_q": q, "link_qd": qd}

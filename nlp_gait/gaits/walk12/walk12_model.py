@@ -138,7 +138,9 @@ def compute_mass_motion(
     heights = DM([robot.foot_com_height_m, robot.shank_m]).T
     near, far = (_shift_to_ankle(leg, (shank or place_on_exact_shank)(leg, heights)) for leg in (stance, swing))
     orders = zip(near, stance.hip, swing.hip, far, strict=True)
-    return Motion(*(ca.horzcat(a, p6, (p6 + other) / 2, other, b[:, 1], b[:, 0]) for a, p6, other, b in orders))
+    return Motion(
+        *(ca.horzcat(a, p6, (p6 + swing_hip) / 2, swing_hip, b[:, 1], b[:, 0]) for a, p6, swing_hip, b in orders)
+    )
 
 
 def place_on_exact_shank(leg: Walk12Leg, heights: DM) -> Motion:

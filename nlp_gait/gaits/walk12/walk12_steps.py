@@ -56,7 +56,7 @@ def compute_steps(
     sample = _make_sample_function(robot, zmp).map(intervals + 1)
     phases = np.linspace(0.0, 1.0, intervals + 1)
     ankle, heading = np.zeros(3), 0.0
-    parts: list[dict[str, Array]] = []
+    arrays_of_steps: list[dict[str, Array]] = []
     for step in range(steps):
         side = 1.0 if step % 2 == 0 else -1.0
         settings = (step_time_s, side * turn_rad, 1 - np.cos(reach_margin_rad))
@@ -68,9 +68,11 @@ def compute_steps(
         arrays_of_step |= _place_in_world(local, side, ankle, heading)
         arrays_of_step |= {"t": (step + phases) * step_time_s, "left_stance": np.full(intervals + 1, 0.5 + 0.5 * side)}
         first = 0 if step == 0 else 1
-        parts.append({name: array[first:] for name, array in arrays_of_step.items()})
+        arrays_of_steps.append({name: array[first:] for name, array in arrays_of_step.items()})
         ankle, heading = arrays_of_step["right_ankle" if side > 0 else "left_ankle"][-1], heading + turn_rad
-    arrays = {name: np.concatenate([step_arrays[name] for step_arrays in parts]) for name in parts[0]}
+    arrays = {
+        name: np.concatenate([step_arrays[name] for step_arrays in arrays_of_steps]) for name in arrays_of_steps[0]
+    }
     return Signals(joints=JOINTS, arrays=arrays, columns=COLUMNS_OF)
 
 
