@@ -46,20 +46,33 @@ def start_browser() -> Iterator[Any]:
 
 
 @contextmanager
-def visit(browser: Any, file: Path, screen: str = "1280 light") -> Iterator[Visit]:
-    """Open a file on a screen of ``SCREENS``."""
+def open_screen(browser: Any, screen: str) -> Iterator[Visit]:
+    """Open an empty page on a screen of ``SCREENS``."""
     width, scheme = SCREENS[screen]
     context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
     opened = Visit(page=context.new_page())
     opened.page.on("console", lambda message: opened.messages.append(message.text))
     opened.page.on("pageerror", lambda error: opened.messages.append(str(error)))
     opened.page.on("request", lambda request: opened.requests.append(request.url))
+    yield opened
+    context.close()
+
+
+def show(opened: Visit, file: Path) -> None:
+    """Show a file, with its messages and requests alone."""
+    opened.messages, opened.requests = [], []
     opened.page.goto(file.as_uri())
     opened.requests = [
         url for url in opened.requests if url != file.as_uri() and not url.startswith(("data:", "blob:"))
     ]
-    yield opened
-    context.close()
+
+
+@contextmanager
+def visit(browser: Any, file: Path, screen: str = "1280 light") -> Iterator[Visit]:
+    """Open a file on a screen of ``SCREENS``."""
+    with open_screen(browser, screen) as opened:
+        show(opened, file)
+        yield opened
 
 
 def wait_for_motion(page: Any) -> None:

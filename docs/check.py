@@ -11,13 +11,14 @@ from __future__ import annotations
 import re
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urldefrag
 
 import pytest
 
-from docs.browser import SCREENS, list_accessibility_faults, list_wide_parts, start_browser, visit
+from docs.browser import SCREENS, list_accessibility_faults, list_wide_parts, open_screen, show, start_browser
 
 LOADING = {
     "script": "src",
@@ -70,6 +71,7 @@ class Page(HTMLParser):
 def faults_of(site: Path) -> list[str]:
     """What is wrong with links, loaded files and pages without content, a sentence each."""
     pages = {path: Page(path) for path in sorted(site.rglob("*.html"))}
+    known = {path.resolve(): page for path, page in pages.items()}
     faults = []
     for path, page in pages.items():
         name = path.relative_to(site)
@@ -81,7 +83,7 @@ def faults_of(site: Path) -> list[str]:
             elif not target.startswith("data:") and not (path.parent / unquote(target.split("?")[0])).exists():
                 faults.append(f"{name} loads {target}, which is not there")
         for link in page.links:
-            faults += _faults_of_link(link, path, name, pages)
+            faults += _faults_of_link(link, path, name, known)
     for sheet in site.rglob("*.css"):
         outside = re.findall(r"(?:url\(|@import )[\"']?((?:https?:)?//[^\"')]+)", sheet.read_text(encoding="utf-8"))
         faults += [f"{sheet.relative_to(site)} loads {target}" for target in outside]
@@ -95,7 +97,7 @@ def _faults_of_link(link: str, path: Path, name: Path, pages: dict[Path, Page]) 
     target = (path.parent / unquote(address)).resolve() if address else path.resolve()
     if not target.exists():
         return [f"{name} links to {link}, which is not there"]
-    known = {p.resolve(): page for p, page in pages.items()}.get(target) if anchor else None
+    known = pages.get(target) if anchor else None
     return (
         [f"{name} links to {link}, which has no such anchor"] if known and unquote(anchor) not in known.anchors else []
     )
@@ -103,20 +105,32 @@ def _faults_of_link(link: str, path: Path, name: Path, pages: dict[Path, Page]) 
 
 def list_shown_faults(site: Path) -> list[str]:
     """What a browser finds on every page: messages, requests, parts that are too wide, and serious faults of accessibility."""
-    faults, before = [], Counter[Path]()
+    faults, paths = [], sorted(site.rglob("*.html"))
     with start_browser() as browser:
-        for number, path in enumerate(sorted(site.rglob("*.html"))):
-            for turn, screen in enumerate(SCREENS):
-                with visit(browser, path, screen) as opened:
-                    opened.page.wait_for_load_state("load")
+        for turn, screen in enumerate(SCREENS):
+            examined = list_examined(paths, turn)
+            # Axe requests style sheets: on a page whose messages are not read.
+            with open_screen(browser, screen) as opened, open_screen(browser, screen) as second:
+                for path in paths:
+                    show(opened, path)
                     found = [f"says {message!r}" for message in opened.messages]
                     found += [f"requests {url}" for url in opened.requests if not url.startswith(site.as_uri())]
                     found += [f"has a part that is too wide: {part}" for part in list_wide_parts(opened.page)]
-                    if number % len(SCREENS) == turn and before[path.parent] < ALIKE:
-                        before[path.parent] += 1
-                        found += [f"is hard to access: {fault}" for fault in list_accessibility_faults(opened.page)]
+                    if path in examined:
+                        show(second, path)
+                        found += [f"is hard to access: {fault}" for fault in list_accessibility_faults(second.page)]
                     faults += [f"{path.relative_to(site)}, {screen}: {fault}" for fault in found]
     return faults
+
+
+def list_examined(paths: Sequence[Path], turn: int) -> set[Path]:
+    """Return the pages whose accessibility is examined on one of the screens: some of each folder, on each screen in turn."""
+    examined, before = set(), Counter[Path]()
+    for number, path in enumerate(paths):
+        before[path.parent] += 1
+        if before[path.parent] <= ALIKE and number % len(SCREENS) == turn:
+            examined.add(path)
+    return examined
 
 
 def main() -> None:

@@ -60,6 +60,7 @@ html_css_files = ["site.css"]
 html_js_files = ["site.js"]
 html_extra_path = [f"generated/{playground.FOLDER}"]
 (ROOT / "docs" / html_extra_path[0]).mkdir(parents=True, exist_ok=True)
+html_use_index = False
 html_show_sourcelink = False
 html_copy_source = False
 html_theme_options = {
