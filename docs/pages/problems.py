@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Literal, get_args, get_origin, get_type_hints
 
 from compare.analysis.units import with_unit
-from compare.drawing.gait_figure import plot_gait
 from docs.difficulty import Best, Difficulty, Reached, difficulties
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import build_exact_model
@@ -54,7 +53,6 @@ CERTIFICATES = """## Certificates
 
 Bounds that are [proven](../../guarantees.md) by branch and bound over all variables, with the boxes that the proof took
 and its time on one core."""
-PICTURE = "Best known gait: six poses at equidistant times, later ones darker (left blue, right orange), with power and margin."
 
 
 def names() -> list[str]:
@@ -67,7 +65,7 @@ def write(folder: Path) -> None:
     folder, measured = folder / "problems", difficulties()
     folder.mkdir(parents=True, exist_ok=True)
     problems = {name: load(name) for name in names()}
-    pages = {f"{name}.md": problem_page(problem, measured.get(name), folder) for name, problem in problems.items()}
+    pages = {f"{name}.md": problem_page(problem, measured.get(name)) for name, problem in problems.items()}
     header = ("problem", "what", "variables", "best known", "feasible points", "IPOPT near", "searches near")
     rows = [_overview(problem, measured.get(name)) for name, problem in problems.items()]
     pages["index.md"] = page(
@@ -161,13 +159,13 @@ def _feasible(found: Difficulty) -> str:
     return f"{100.0 * found.feasible_points / found.points:.3g} %"
 
 
-def problem_page(problem: GaitProblem, found: Difficulty | None, folder: Path) -> str:
-    """Return the page of a problem, and write its picture into the folder."""
+def problem_page(problem: GaitProblem, found: Difficulty | None) -> str:
+    """Return the page of a problem."""
     best = None if found is None else found.best
     return page(
         f"# {problem.name}",
         f"**{literal(problem.title)}.** {literal(_words(problem))}",
-        _picture(problem, best, folder),
+        frame_gait(problem.name) if best is not None and problem.display.skeleton is not None else "",
         best_section(problem, found),
         _variables(problem, best),
         _binding(problem, best),
@@ -185,14 +183,6 @@ def _words(problem: GaitProblem) -> str:
     """Return the first paragraph of its module's docstring after the title, or else of its maker's."""
     module = inspect.getdoc(importlib.import_module(PROBLEMS[problem.name].partition(":")[0])) or ""
     return " ".join(" ".join(module.split("\n\n")[:2]).split())
-
-
-def _picture(problem: GaitProblem, best: Best | None, folder: Path) -> str:
-    if best is None or problem.display.motion is None:
-        return ""
-    plot_gait(problem, best.x, problem.name).savefig(folder / f"{problem.name}.png", dpi=150)
-    words = f"![{PICTURE}]({problem.name}.png)"
-    return words if problem.display.skeleton is None else f"{words}\n\n{frame_gait(problem.name)}"
 
 
 def frame_gait(name: str) -> str:

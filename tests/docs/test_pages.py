@@ -94,10 +94,10 @@ def test_the_sizes_of_the_nlps_are_those_of_today() -> None:
 
 
 @pytest.mark.slow
-def test_the_page_of_a_problem_is_made_from_the_problem(tmp_path: Path) -> None:
+def test_the_page_of_a_problem_is_made_from_the_problem() -> None:
     problem, found = load("nao-dsp"), problems.difficulties()["nao-dsp"]
-    page = problems.problem_page(problem, found, tmp_path)
-    assert (tmp_path / "nao-dsp.png").stat().st_size > 10_000
+    page = problems.problem_page(problem, found)
+    assert "gaits/nao-dsp.html" in page
     assert all(f"| `{v.name}` | {v.lower:g} | {v.upper:g} |" in page for v in problem.variables)
     assert all(f"`{q.name}`" in page for q in problem.own_parameters if not q.name.endswith((".lower", ".upper")))
     assert found.best is not None and f"**{found.best.objective:.8g} W**" in page
