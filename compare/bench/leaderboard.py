@@ -13,9 +13,8 @@ from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
 from compare.bench.baseline import EVALUATIONS, get_reference, load_baseline
 from compare.drawing.comparison_figures import make_suite_ecdf_charts
 from compare.report.document import Document, Section, Table, make_text_table
-from compare.report.problem_section import make_chart_figure
 from compare.report.provenance import TERMS
-from compare.report.study_sections import make_wins_table
+from compare.report.study_sections import make_chart_figure, make_wins_table
 from compare.study.record import RunRecord
 from nlp_gait import gaitbench
 

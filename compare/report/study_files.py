@@ -11,7 +11,7 @@ from compare.drawing.figures import save_figure
 from compare.drawing.shapes import COLUMN
 from compare.report.document import Document, Figure, iterate_leaves
 from compare.report.latex import describe_run_counts, escape_latex, format_latex_overview, format_latex_table
-from compare.report.problem_section import FIGURES
+from compare.report.study_sections import FIGURES
 from compare.study.record import HEADER, JUDGED, make_judged_cells, make_row
 from nlp_gait.files import format_csv, make_file_name, replace_nan, write_text
 

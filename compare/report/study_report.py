@@ -10,7 +10,6 @@ from compare.analysis.record_statistics import Weighting
 from compare.drawing.figures import share_looks
 from compare.judge import evaluate
 from compare.report.document import Document, Section, make_table_section
-from compare.report.problem_section import load_gaits, make_problem_section
 from compare.report.study_files import FurtherFiles
 from compare.report.study_sections import (
     HOW,
@@ -19,8 +18,10 @@ from compare.report.study_sections import (
     list_costs,
     list_optimum,
     list_tests,
+    load_gaits,
     make_folded_section,
     make_overview,
+    make_problem_section,
     make_settings_section,
 )
 from compare.report.writing import write_document

@@ -9,7 +9,7 @@ import pytest
 
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.drawing.gait_figure import draw_gaits, make_gait_charts, measure_deviation
-from compare.report.problem_section import load_gaits
+from compare.report.study_sections import load_gaits
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import Limb, Skeleton
 from tests.compare.records import DSP_X, record, study
