@@ -14,8 +14,7 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input
-from nlp_gait.robots.limits import read_in_child
-from nlp_gait.robots.meshes import list_shape_points, move_points, read_model
+from nlp_gait.robots.meshes import list_shape_points, move_points, read_in_child, read_model
 from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers

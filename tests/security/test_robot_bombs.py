@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.robots import limits, load_robot
+from nlp_gait.robots import load_robot, meshes
 from nlp_gait.robots.meshes import read_mesh_points
 from nlp_gait.robots.mjcf import read_mjcf
 
@@ -53,8 +53,8 @@ BOMBS = (
 
 @pytest.fixture
 def small_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(limits, "TIME_LIMIT_S", TIME_S)
-    monkeypatch.setattr(limits, "MEMORY_LIMIT_BYTES", MEMORY_BYTES)
+    monkeypatch.setattr(meshes, "TIME_LIMIT_S", TIME_S)
+    monkeypatch.setattr(meshes, "MEMORY_LIMIT_BYTES", MEMORY_BYTES)
 
 
 @pytest.mark.slow

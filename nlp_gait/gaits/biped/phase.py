@@ -59,17 +59,8 @@ COLUMNS = {
 
 
 # Time histories by name, and the quantities that they are.
-HISTORIES = {
-    "q": "all_q",
-    "qd": "all_qd",
-    "qdd": "all_qdd",
-    "tau": "torque",
-    "zmp": "zmp",
-    "hip": "hip",
-    "com": "com",
-    "left_foot": "left_foot",
-    "right_foot": "right_foot",
-}
+HISTORIES = {"q": "all_q", "qd": "all_qd", "qdd": "all_qdd", "tau": "torque"}
+HISTORIES |= {name: name for name in ("zmp", "hip", "com", "left_foot", "right_foot")}
 IN_TIME = (*HISTORIES.values(), *(f"wrench_{side}" for side in BOTH_FEET), "attitude", "yaw")
 
 

@@ -1,4 +1,4 @@
-"""NAO on its left foot with free joints between the paper's ends: the lower bound of all plans of hip, foot and arms.
+"""NAO on its left foot with free joints between the paper's ends: the lower bound of all plans; options are in ``gaits.nao``.
 
 Each joint's angle is a cubic between the ends plus a spline that leaves the ends unchanged. At both ends the robot has the
 paper's pose: torso upright at the paper's hip positions with the hip's velocities as variables, both soles flat and at rest, arms
@@ -6,23 +6,31 @@ at rest. In between all joints of the legs are free, including the coupled yaw-p
 paper swings: the torso leans and turns, the swing foot tilts and leaves its line.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, Point
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, Point, maker
+from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import LIFT, Support, read_duration
-from nlp_gait.gaits.biped.curves import SPANS, Splines, Trajectory
+from nlp_gait.gaits.biped.curves import SPANS, SPLINE_SAMPLES, Splines, Trajectory
 from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
+from nlp_gait.gaits.biped.phase_problem import make_phase_problem
 from nlp_gait.gaits.biped.samples import CORNERS, Samples
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
 from nlp_gait.gaits.nao.joint_phase import JointPhase
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, PLANNED_JOINTS, YAW_PITCHES
+from nlp_gait.gaits.nao.leaning_torso import make_leaning_nao
+from nlp_gait.gaits.nao.problems import STEP_M, NaoOptions, PaperLoads, nao_ssp
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.tape import tabulate_last_input
 from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic, fit_spline
@@ -139,3 +147,62 @@ def fit_joints(trajectory: Trajectory, planned: GaitProblem, x: Array) -> Array:
     columns = dict(zip(signals.joints, fit_spline(q - straight.T, spans, phases).T, strict=True))
     columns[YAW_PITCH] = np.mean([columns[name] for name in YAW_PITCHES], axis=0)
     return np.concatenate([planned_x, *(columns[curve] for curve in CURVES)])
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeOptions:
+    """A phase whose joints are free."""
+
+    intervals: int = 10
+    trajectory: Trajectory = "spline-4"
+    step_length_m: float = STEP_M
+    samples_per_interval: int = SPLINE_SAMPLES
+
+    def make_grid(self) -> Grid:
+        """Return the samples."""
+        samples = self.samples_per_interval
+        return Grid(intervals=self.intervals, samples_per_interval=samples, refined_by="samples_per_interval")
+
+
+@maker
+def nao_ssp_free(robot: NaoOptions, options: FreeOptions) -> GaitProblem:
+    """Single support of NAO with free joints. One of the samples must be the middle.
+
+    Source:
+        Ends, limits and objective of Gupta, Pratihar, Deb (2023), section 4.1; the formulation is this package's own.
+    """
+    grid, body = options.make_grid(), robot.make_body()
+    if grid.parts % 2:
+        raise InputError(f"intervals * samples_per_interval must be even, got {grid.parts}: one sample is the middle")
+    step_m = body.check_step_length(options.step_length_m)
+    phase = make_free_single_support_phase(body, step_m, options.trajectory, grid)
+
+    @cache
+    def make_planned() -> GaitProblem:
+        return nao_ssp(robot=robot.robot, rotational_inertia=robot.rotational_inertia, step_length_m=step_m)
+
+    def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+        """Start from the paper's motion, for random values of its variables."""
+        return fit_joints(options.trajectory, make_planned(), draw_uniform(phase.paper.names, parameters, rng))
+
+    title = "single support with free joints: least mean power"
+    return make_phase_problem("ssp-free", title, replace(phase, start=start), searchable=False)
+
+
+@maker
+def nao_dsp_free(robot: NaoOptions, options: FreeOptions, loads: PaperLoads) -> GaitProblem:
+    """Double support of NAO with every freedom that two flat soles leave.
+
+    The curves are those of ``nao-dsp`` and the torso's roll and pitch, zero and at rest at both ends; with zero coefficients on
+    these the motion is that of ``nao-dsp``.
+
+    Source:
+        Ends, limits, loads and objective of Gupta, Pratihar, Deb (2023), section 4.2; the formulation is this package's own.
+    """
+    body, grid = make_leaning_nao(robot.make_body()), options.make_grid()
+    step_m = body.check_step_length(options.step_length_m)
+    divided = make_divided_loads(body, loads.torso_share)
+    phase = make_support_phase(body, Support.DOUBLE, step_m, options.trajectory, grid, Goal(), divided)
+    return make_phase_problem(
+        "dsp-free", "double support with a leaning torso: least mean power", phase, searchable=False
+    )

@@ -11,14 +11,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import check_count
 from nlp_gait.formulation import Array, Display, GaitProblem, Grid, Signals, SolverHints, maker
-from nlp_gait.formulation.assembly import (
-    Assembly,
-    Constraint,
-    NumericPoint,
-    Objective,
-    Point,
-    Variable,
-)
+from nlp_gait.formulation.assembly import Assembly, Constraint, NumericPoint, Objective, Point, Variable
 from nlp_gait.formulation.display import SimulationModel, Tread
 from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.gaits.stairs import planar_biped as biped
@@ -26,12 +19,7 @@ from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import make_rigid_bodies, make_signals, measure_stair
 from nlp_gait.gaits.stairs.ideal import AXES, NOISE, PARAMETERS, IdealStep, make_equal_rows, make_ideal_step
 from nlp_gait.gaits.stairs.planar_biped import MOVING
-from nlp_gait.gaits.stairs.planned_motion import (
-    Stair,
-    StepKind,
-    compute_heights,
-    compute_shank_gaps,
-)
+from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, compute_heights, compute_shank_gaps
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 EDGE_RESERVE = 0.01  # by which edges are nearer than the steps' [m]; they are rounded over ``stair.EDGE_WIDTH``

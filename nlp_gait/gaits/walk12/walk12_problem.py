@@ -13,8 +13,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Assembly, Constraint, Display, GaitProblem, Grid, Objective, Point, SolverHints, maker
 from nlp_gait.formulation.assembly import RowsOverTime, Variable, make_parameters
 from nlp_gait.gaits.walk12 import walk12_model
-from nlp_gait.gaits.walk12.walk12_display import make_skeleton
-from nlp_gait.gaits.walk12.walk12_steps import compute_steps_at
+from nlp_gait.gaits.walk12.walk12_steps import compute_steps_at, make_skeleton
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 Horizon = Literal["step", "1s"]

@@ -1,4 +1,4 @@
-"""Consecutive steps of the 12-joint biped with exchanged stance and swing legs, straight or in a circle.
+"""Consecutive steps of the 12-joint biped with exchanged stance and swing legs, straight or in a circle, and their drawing.
 
 The left leg (theta 1 to 6, ankle to hip) stands first. Every second step is the mirror image of the first: the legs change
 roles, roll angles and the side of all positions change sign. On a circle the swing leg is yawed by K at its hip, theta 9 in
@@ -8,6 +8,7 @@ Source:
     Goswami, Vadakkepat, Phung (2008), sections 4 and 5.4.
 """
 
+from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
@@ -15,8 +16,9 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.formulation import Array, Columns, NumericPoint, Signals, make_vector_columns
+from nlp_gait.formulation import Array, Columns, NumericPoint, Signals, display, make_vector_columns
 from nlp_gait.gaits.walk12 import walk12_model
+from nlp_gait.gaits.walk12.walk12_model import PointMassBiped
 from nlp_gait.symbolic.nonsmooth import Exact
 
 JOINTS = tuple(f"theta_{i}" for i in range(1, 13))
@@ -138,3 +140,34 @@ def _make_sample_function(robot: walk12_model.PointMassBiped, reading: walk12_mo
     return ca.Function(
         "step", inputs, ca.cse(list(outputs.values())), ["x", "T", "K", "margin", "phase"], list(outputs)
     )
+
+
+def make_skeleton(robot: PointMassBiped, signals: Signals, parameters: Mapping[str, float]) -> display.Skeleton:
+    """Return the stick figure of a motion; the robot turns to the left by ``turn_rad`` after each step."""
+    arrays = signals.arrays
+    waist, left_stands = arrays["waist"], arrays["left_stance"] > 0.5
+    heading = np.concatenate([[0], np.cumsum(np.diff(left_stands) != 0)]) * parameters["turn_rad"]
+    forward = np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1)
+    across = np.stack([-np.sin(heading), np.cos(heading), np.zeros_like(heading)], axis=1)
+    outline = display.make_rectangle(
+        -robot.foot_back_m, robot.foot_front_m, -robot.foot_width_m / 2, robot.foot_width_m / 2
+    )
+    limbs, soles = [], []
+    for side, sign, stands in ((display.LEFT, 0.5, left_stands), (display.RIGHT, -0.5, ~left_stands)):
+        hip, ankle = waist + sign * robot.hip_distance_m * across, arrays[f"{side}_ankle"]
+        knee = _place_knee(hip, ankle, forward, robot.thigh_m, robot.shank_m)
+        limbs.append(display.Limb(side=side, points=np.stack([waist, hip, knee, ankle], axis=1)))
+        corners = ankle[:, None, :] + outline[:, :1] * forward[:, None, :] + outline[:, 1:2] * across[:, None, :]
+        soles.append(display.Sole(side=side, corners=corners, supports=stands))
+    return display.make_flat_skeleton(signals, limbs, soles)
+
+
+def _place_knee(hip: Array, ankle: Array, forward: Array, thigh: float, shank: float) -> Array:
+    """Return the knee (T, 3), bent forward in the plane of the leg and the forward axis [m]; a leg out of reach is straight."""
+    leg = ankle - hip
+    length = np.linalg.norm(leg, axis=1, keepdims=True)
+    along = leg / length
+    down = (thigh**2 - shank**2 + length**2) / (2 * length)
+    ahead = forward - (forward * along).sum(axis=1, keepdims=True) * along
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    return np.asarray(hip + down * along + np.sqrt(np.maximum(thigh**2 - down**2, 0.0)) * ahead)
