@@ -17,15 +17,19 @@ class LiveGaps:
 
     def __init__(self) -> None:
         self._records: dict[str, list[RunRecord]] = {}
+        self._known: dict[str, float | None] = {}  # looked up once for each problem, which takes longer than a line
 
     def add(self, record: RunRecord) -> str:
         """Take a finished run, and return a line for each problem: ``nao-ssp: ipopt 0.0000 % (20), pso 0.33 % (7)``."""
         self._records.setdefault(record.problem, []).append(record)
-        return "\n".join(f"{problem}: {', '.join(_list_gaps(records))}" for problem, records in self._records.items())
+        if record.problem not in self._known:
+            self._known[record.problem] = find_reference(record.inputs.problem).objective
+        lines = ((problem, _list_gaps(runs, self._known[problem])) for problem, runs in self._records.items())
+        return "\n".join(f"{problem}: {', '.join(gaps)}" for problem, gaps in lines)
 
 
-def _list_gaps(records: Sequence[RunRecord]) -> list[str]:
-    objective, known = records[0].inputs.objective, find_reference(records[0].inputs.problem).objective
+def _list_gaps(records: Sequence[RunRecord], known: float | None) -> list[str]:
+    objective = records[0].inputs.objective
     reference = find_best_known(records, objective) if known is None else known
     gaps: dict[str, list[float]] = {}
     for record in records:
