@@ -25,11 +25,8 @@ if TYPE_CHECKING:
     from nlp_gait.formulation.registry import list_problems, load, maker
     from nlp_gait.formulation.result import Result, load_result, sample_at_period, sample_finely, sample_signals
 
-# Imported on first use: what is part of a problem needs neither the registry nor results.
-_LATER = {
-    "registry": ("list_problems", "load", "maker"),
-    "result": ("Result", "load_result", "sample_at_period", "sample_finely", "sample_signals"),
-}
+# Imported on first use, others from ``result``: what is part of a problem needs neither the registry nor results.
+_REGISTRY = ("list_problems", "load", "maker")
 
 __all__ = [
     "Array",
@@ -66,7 +63,6 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import a name when it is first used."""
-    for module, names in _LATER.items():
-        if name in names:
-            return import_object(f"{__name__}.{module}:{name}")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return import_object(f"{__name__}.{'registry' if name in _REGISTRY else 'result'}:{name}")

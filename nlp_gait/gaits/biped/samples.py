@@ -44,8 +44,8 @@ class Quantity:
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
-    def __get__(self, samples: "Samples", owner: type) -> MX:
-        return samples.read(self._name)
+    def __get__(self, samples: "Samples | None", owner: type) -> MX:
+        return self if samples is None else samples.read(self._name)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
