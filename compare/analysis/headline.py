@@ -83,7 +83,8 @@ def _describe_gaps(comparison: Comparison, solvers: Sequence[SolverRuns]) -> str
     parts = []
     if above:
         doubts = _list_doubts(comparison)
-        doubt = f" ({', '.join(doubts)})" if doubts else ""
+        words = "too few runs for a test" if comparison.power else ", ".join(doubts)
+        doubt = f" ({words})" if doubts else ""
         parts.append(f"Median runs end {_describe_side(comparison)} it by {', '.join(above)}{doubt}")
     if reached:
         parts.append(", ".join([reached[0], *(text.replace(" reaches it", "", 1) for text in reached[1:])]))
