@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from compare.drawing.shapes import Drawing
 
 # One colour for each solver in every figure (Okabe and Ito); others get the remaining ones in order.
 COLOURS = {
@@ -133,11 +132,10 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     return save_figure(figure, stem.with_name(f"{stem.name}.png")), svg
 
 
-def save_figure(drawing: Figure | Drawing, path: Path) -> Path:
-    """Write a drawing as PNG or PDF and return the path; raises OutputError."""
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure as PNG or PDF and return the path; raises OutputError."""
     kind = path.suffix.removeprefix(".")
     metadata = {"CreationDate": None, "Creator": None, "Producer": None} if kind == "pdf" else None
-    figure = drawing if hasattr(drawing, "savefig") else drawing.to_figure()
     with use_style(), replace_file(path) as file, delay_interrupts():
         figure.savefig(file, format=kind, metadata=metadata)
     return path

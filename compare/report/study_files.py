@@ -8,7 +8,7 @@ from compare.analysis.comparison import Comparison
 from compare.analysis.record_statistics import TARGETS
 from compare.drawing.charts import draw_charts
 from compare.drawing.figures import save_figure
-from compare.drawing.shapes import COLUMN
+from compare.drawing.shapes import COLUMN, Drawing
 from compare.report.document import Document, Figure, iterate_leaves
 from compare.report.latex import describe_run_counts, escape_latex, format_latex_overview, format_latex_table
 from compare.report.study_sections import FIGURES
@@ -42,7 +42,9 @@ class FurtherFiles:
         if self.figures:
             for part in iterate_leaves(document.parts):
                 if isinstance(part, Figure):
-                    written.append(save_figure(part.draw(), folder / f"{part.name}.png"))
+                    drawing = part.draw()
+                    figure = drawing.to_figure() if isinstance(drawing, Drawing) else drawing
+                    written.append(save_figure(figure, folder / f"{part.name}.png"))
         for comparison in comparisons:
             stem = folder / make_file_name(comparison.problem)
             if self.latex:
@@ -94,7 +96,7 @@ def _write_figures(stem: Path, comparison: Comparison) -> list[Path]:
     for name, (compute, caption) in FIGURES.items():
         figure = f"{stem.name}-{name}"
         drawing = draw_charts(compute(comparison)[:1], width=COLUMN)
-        written.append(save_figure(drawing, stem.with_name(f"{figure}.pdf")))
+        written.append(save_figure(drawing.to_figure(), stem.with_name(f"{figure}.pdf")))
         words = f"{caption.removesuffix('.')}; {comparison.problem}, {describe_run_counts(comparison)}."
         text += (
             f"\\begin{{figure}}\n\\centering\n\\includegraphics{{{figure}.pdf}}\n"
