@@ -1,6 +1,7 @@
 """One finished run, as plain data, as a JSON file, and as a row of a table: the only place that knows the schema.
 
 A new field of a record needs one line in ``RunRecord``, where the run fills it in (``run_task.py``), and ``SCHEMA`` + 1.
+What differs when a run is repeated belongs to ``Times`` or ``Origin``, which ``verify`` does not compare.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import compare.study.run_study
-from compare.study.record import read_record
+from compare.study.record import SCHEMA, read_record
 from compare.study.record_files import locate_record, read_records
 from compare.study.run_study import Study, run_study
 from compare.study.run_task import try_task
@@ -99,8 +99,8 @@ def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
     good = locate_record(undisturbed, task).read_text()
     for text, message in (
         (good[: len(good) // 2], "is not valid JSON"),
-        ("[]", "'schema' must be 5, got 'list'"),
-        (good.replace('"schema": 5', '"schema": 1'), "'schema' must be 5, got 1"),
+        ("[]", f"'schema' must be {SCHEMA}, got 'list'"),
+        (good.replace(f'"schema": {SCHEMA}', '"schema": 0'), f"'schema' must be {SCHEMA}, got 0"),
         (good.replace('"history": {', '"history": 3, "other": {'), "damaged"),
         (good.replace(' "failed_evaluations": 0,\n', ""), "it must have every field"),
         (good.replace('  "feasible": true,\n', ""), "it must have every field"),
