@@ -17,7 +17,7 @@ class LiveGaps:
 
     def __init__(self) -> None:
         self._records: dict[str, list[RunRecord]] = {}
-        self._known: dict[str, float | None] = {}  # looked up once for each problem, which takes longer than a line
+        self._known: dict[str, float | None] = {}  # best known objectives by problem
 
     def add(self, record: RunRecord) -> str:
         """Take a finished run, and return a line for each problem: ``nao-ssp: ipopt 0.0000 % (20), pso 0.33 % (7)``."""

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
 # One colour for each solver in every figure (Okabe and Ito); others get the remaining ones in order.
 COLOURS = {
     "ipopt": "#000000",

@@ -98,7 +98,7 @@ def check_records(
     pairs = list(zip(records, contexts, strict=True))
     reasons = [[reason for check in CHECKS if (reason := check(*pair))] for pair in pairs]
     chosen = list(_choose_runs(pairs, reasons, between_samples))
-    for k in {id(contexts[k].problem): k for k in chosen}.values():  # what it builds, the forks have
+    for k in {id(contexts[k].problem): k for k in chosen}.values():  # builds what the forks inherit
         check_between_samples(*pairs[k])
     for k, reason in zip(chosen, compute_in_forks(lambda k: check_between_samples(*pairs[k]), chosen), strict=True):
         reasons[k] += [reason] if reason else []

@@ -99,16 +99,17 @@ def resolve_user_code(settings: StudySettings, owner: str) -> StudySettings:
     """Return settings from a folder with user code as this command names it; raises UserCodeError if it does not."""
     return replace(
         settings,
-        problems=tuple(
-            replace(p, name=name, options=options)
-            for p in settings.problems
-            for name, options in [resolve_stored(p.address, p.options, owner)]
-        ),
+        problems=tuple(_resolve_problem(p, owner) for p in settings.problems),
         solvers=tuple(
             s if s.name in list_solvers() else replace(s, name=resolve_code(s.name, "algorithm", owner))
             for s in settings.solvers
         ),
     )
+
+
+def _resolve_problem(problem: ProblemSpec, owner: str) -> ProblemSpec:
+    name, options = resolve_stored(problem.address, problem.options, owner)
+    return replace(problem, name=name, options=options)
 
 
 def read_settings(path: Path) -> StudySettings:

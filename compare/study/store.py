@@ -68,10 +68,18 @@ class Store:
             for folder in (self.folder, *(path for path in self.folder.rglob("*") if path.is_dir())):
                 remove_leftovers(folder)
 
-    def compute(self, name: str, inputs: Mapping[str, Any], function: Callable[[], Any], **options: Any) -> Any:
-        """Return a stored result, or compute and store it; options and errors as ``compute_all``."""
+    def compute(
+        self,
+        name: str,
+        inputs: Mapping[str, Any],
+        function: Callable[[], Any],
+        *,
+        code: Sequence[ModuleType] = (),
+        progress: Progress = ignore_progress,
+    ) -> Any:
+        """Return a stored result, or compute and store it; arguments and errors as ``compute_all``."""
         computation = Computation(name=name, inputs=inputs, function=function)
-        return self.compute_all([computation], jobs=1, **options)[name]
+        return self.compute_all([computation], jobs=1, code=code, progress=progress)[name]
 
     def compute_all(
         self,

@@ -91,9 +91,11 @@ def load_robot(name_or_path: str) -> Robot:
     if not isinstance(name_or_path, str):
         raise UnknownNameError(f"the name of a robot must be a text, got {format_value(name_or_path)}")
     check_path(name_or_path, f"robot {name_or_path!r}", RobotDataError)
+    if not is_robot_file(name_or_path):
+        return _load_shipped(name_or_path)
     held = _held.get()
-    if held is None or not is_robot_file(name_or_path):
-        return _load(name_or_path) if is_robot_file(name_or_path) else _load_shipped(name_or_path)
+    if held is None:
+        return _load(name_or_path)
     if name_or_path not in held:
         held[name_or_path] = _load(name_or_path)
     return held[name_or_path]
@@ -303,6 +305,6 @@ def _complete(
         forward = description.file.forward
         feet = infer_feet(name, legs, links, joints, feet, model.read_shapes, forward, notes)
     if count := sum("foot:" not in note for note in notes):
-        count_of_notes = f"{count} note{'s' * (count > 1)} on welded parts"
-        warn_once("robot %r: %s; see nlp-gait list --robot FILE", name, count_of_notes)
+        summary = f"{count} note{'s' * (count > 1)} on welded parts"
+        warn_once("robot %r: %s; see nlp-gait list --robot FILE", name, summary)
     return feet

@@ -9,6 +9,7 @@ from functools import partial
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
+from typing import Any
 
 from nlp_gait.errors import RobotDataError, unknown
 
@@ -78,7 +79,11 @@ def _list_menagerie(package: str) -> Mapping[str, Locate]:
     """Return the robots of MuJoCo's menagerie, which the package downloads, or reads below ``MENAGERIE_ROOT``."""
     distribution(package)
     robots = import_module("mujoco_menagerie").robots()
-    return {robot.name: partial(lambda model: str(model.xml(model.default_model)), robot) for robot in robots}
+    return {robot.name: partial(_fetch_model, robot) for robot in robots}
+
+
+def _fetch_model(robot: Any) -> str:
+    return str(robot.xml(robot.default_model))
 
 
 def _list_descriptions(package: str) -> Mapping[str, Locate]:

@@ -72,7 +72,7 @@ class IpoptSettings(Solver):
 
     tolerance: float = 1e-8  #: IPOPT's ``tol``
     iterations: int = 300  #: limit of iterations for each stage, in the first stage for each set of rows
-    #: Limit of wall time for all stages of a run [s]; checked after each iteration, of which one of ``stairs-track`` took 591 s
+    #: Limit of wall time for all stages of a run [s]; checked between iterations; one of ``stairs-track`` took 591 s
     time_limit_s: float = 300.0
     hessian: str | None = None  #: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem
     #: whether the NLP's functions and derivatives are compiled; None: where that pays for the number of solves and there is a

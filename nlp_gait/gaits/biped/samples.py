@@ -60,16 +60,16 @@ class Samples:
     progress: MX  # (1, N + 1) shares of the phase's time, from 0 to 1
     values: Mapping[str, MX]  # (k, N + 1) by name of the quantity
 
-    planned = Quantity()  # (k, N + 1) planned angles [rad]
-    reach = Quantity()  # (2, N + 1) cosines of the knees
-    torque = Quantity()  # (J, N + 1) torques [Nm]
-    power = Quantity()  # (m, N + 1) mechanical power of the joints that move [W], signed
-    zmp = Quantity()  # (2, N + 1) ZMP in the world [m]
-    miss = Quantity()  # (k, N + 1) distances by which legs miss their feet [m]; empty where they cannot
-    q = Quantity()  # (m, N + 1) angles of the joints that move [rad]
-    qd = Quantity()  # (m, N + 1) their velocities [rad/s]
-    qdd = Quantity()  # (m, N + 1) their accelerations [rad/s^2]
-    # (1, N + 1) height of the right sole above the left one [m]; of a sole that may tilt (4, N + 1), of its ``CORNERS``
+    planned = Quantity()  #: (k, N + 1) planned angles [rad]
+    reach = Quantity()  #: (2, N + 1) cosines of the knees
+    torque = Quantity()  #: (J, N + 1) torques [Nm]
+    power = Quantity()  #: (m, N + 1) mechanical power of the joints that move [W], signed
+    zmp = Quantity()  #: (2, N + 1) ZMP in the world [m]
+    miss = Quantity()  #: (k, N + 1) distances by which legs miss their feet [m]; empty where they cannot
+    q = Quantity()  #: (m, N + 1) angles of the joints that move [rad]
+    qd = Quantity()  #: (m, N + 1) their velocities [rad/s]
+    qdd = Quantity()  #: (m, N + 1) their accelerations [rad/s^2]
+    #: (1, N + 1) height of the right sole above the left one [m]; of a sole that may tilt (4, N + 1), of its ``CORNERS``
     swing_heights = Quantity()
 
     def read(self, name: str) -> MX:
