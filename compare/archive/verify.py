@@ -275,8 +275,9 @@ def _describe_scope(folder: Path, records: Sequence[RunRecord], repeated: int) -
     listed = {name_run(record) for record in records}
     others = sum(path.relative_to(folder / RECORDS).with_suffix("").as_posix() not in listed
                  for path in (folder / RECORDS).glob("*/*.json"))  # fmt: skip
-    parts = [f"the course of {len(records) - repeated} runs that were not repeated", "times and machines: as recorded"]
-    parts += ["runs that were made, but never listed"]
+    unrepeated = len(records) - repeated
+    parts = [f"the course of {unrepeated} runs that were not repeated"] if unrepeated else []
+    parts += ["times and machines: as recorded", "runs that were made, but never listed"]
     if any(isinstance(record.inputs.solver, Mapping) for record in records):
         parts += ["evaluations that user code makes by loading the problem itself"]
     parts += [f"{others} other records in the folder"] if others else []
