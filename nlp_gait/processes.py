@@ -5,6 +5,7 @@ their functions are pickled too. Python files in the working folder never run by
 """
 
 import ctypes
+import math
 import mmap
 import multiprocessing
 import os
@@ -60,6 +61,11 @@ def keep_working_folder() -> Iterator[None]:
         os.chdir(folder)
         if isinstance(folder, int):
             os.close(folder)
+
+
+def has_fork() -> bool:
+    """Return whether this process may fork: not on Windows, and not in Dask's workers."""
+    return "fork" in multiprocessing.get_all_start_methods() and not multiprocessing.current_process().daemon
 
 
 def _fork(work: Callable[[Connection], None]) -> tuple[Connection, BaseProcess]:
@@ -159,20 +165,22 @@ def run_in_isolation(
     most_bytes: int,
     memory_bytes: int | None = None,
     answer: Callable[[bytes], bytes] | None = None,
+    stop: Callable[[], bool] = never,
 ) -> bytes:
     """Return what a call returns, at most so many bytes, in a forked process with its own session, without input and output.
 
     The call may hang, crash, exit or print. Its process and everything that it has started are killed at the end.
     With ``memory_bytes``, it may take so much address space beyond what this process has (Linux only). With ``answer``, the call
-    receives a function by which it asks this process. Raises TimeoutError after the time limit, and WorkerError, which says how,
-    if the process ended without a result.
+    receives a function by which it asks this process. Raises TimeoutError after the time limit or once ``stop`` returns True, and
+    WorkerError, which says how, if the process ended without a result.
     """
     results, process = _fork(lambda sender: _isolate(sender, call, memory_bytes, answer is not None))
-    latest = None if time_limit_s is None else time.monotonic() + time_limit_s
+    latest = math.inf if time_limit_s is None else time.monotonic() + time_limit_s
     try:
         while True:
-            if not wait([results, process.sentinel], None if latest is None else max(0.0, latest - time.monotonic())):
-                raise TimeoutError
+            while not wait([results, process.sentinel], STOP_CHECKED_EVERY_S):
+                if time.monotonic() > latest or stop():
+                    raise TimeoutError
             data = b""
             with suppress(EOFError, OSError):
                 data = results.recv_bytes(most_bytes) if results.poll(0) else b""

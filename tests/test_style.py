@@ -45,7 +45,7 @@ VERBS = frozenset(
     kill label lay limit link list load locate lock log make mark maximise measure meets minimize mirror move mutate name pack
     parse pass perturb pick place plan plot pose predict prepare price print probe protect raise rank read rebuild record
     reflect register remember remove rename render renew repair repeat replace report require resolve reverse roll rotate round
-    run sample save say score search seed select share shift shorten show simulate solve split spread stack start store sum
+    run sample save say score search seed select send share shift shorten show simulate solve split spread stack start store sum
     summarise swing tabulate take takes tie title to track train try tune turn unite unpack use verify watch weld with write
     """.split()
 )

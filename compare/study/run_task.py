@@ -2,7 +2,6 @@
 
 import json
 import math
-import multiprocessing
 import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
@@ -26,7 +25,7 @@ from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import LARGEST_FILE, check_plain
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Best
-from nlp_gait.processes import keep_working_folder, run_in_isolation
+from nlp_gait.processes import has_fork, keep_working_folder, run_in_isolation
 
 Run = Callable[[Task], RunRecord]
 """Performs one run of a task."""
@@ -90,7 +89,7 @@ def _run_isolated(task: Task, run: Run) -> RunRecord:
 
     Everything but the run is built before the fork, so that the time limit is for the run alone. What it prints is dropped.
     """
-    if "fork" not in multiprocessing.get_all_start_methods() or multiprocessing.current_process().daemon:
+    if not has_fork():
         return _run_caught(task, run)
     problem = task.problem.load()
     counter = _Counter(problem, task.stop.evaluations)

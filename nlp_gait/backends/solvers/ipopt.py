@@ -16,7 +16,14 @@ import numpy as np
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, NLP_VALUES, CompiledNlp
 from nlp_gait.backends.nlp import build_nlp
-from nlp_gait.backends.solvers.solver import REASONS, IterationWatch, Solver, count_evaluations, judge_point
+from nlp_gait.backends.solvers.solver import (
+    REASONS,
+    IterationWatch,
+    Solver,
+    WatchedSolver,
+    count_evaluations,
+    judge_point,
+)
 from nlp_gait.backends.solvers.working_set import LEAST_ROWS, WorkingSet
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import make_temporary_folder
@@ -72,7 +79,7 @@ class IpoptSettings(Solver):
 
     tolerance: float = 1e-8  #: IPOPT's ``tol``
     iterations: int = 300  #: limit of iterations for each stage, in the first stage for each set of rows
-    #: Limit of wall time for all stages of a run [s]; checked between iterations; one of ``stairs-track`` took 591 s
+    #: Limit of wall time for all stages of a run [s]; selecting the rows of a large problem, once for all runs, has as much again
     time_limit_s: float = 300.0
     hessian: str | None = None  #: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem
     #: whether the NLP's functions and derivatives are compiled; None: where that pays for the number of solves and there is a
@@ -170,17 +177,19 @@ class Ipopt(Solver):
         warm: dict[str, Any] = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": WARM_BARRIER}
         warm |= {f"ipopt.warm_start_{what}_push": 1e-6 for what in ("bound", "slack_bound", "mult_bound")}
         warm["ipopt.warm_start_init_point"] = "yes"
-        self.warm = ca.nlpsol("warm", "ipopt", nlp, {**options, **derivatives, **warm})
+        self.warm = WatchedSolver(ca.nlpsol("warm", "ipopt", nlp, {**options, **derivatives, **warm}), self.watch)
         # Narrower sigmoids start close to a feasible point: a larger barrier throws samples over the jump, to a worse optimum.
         near: dict[str, Any] = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": WARM_BARRIER}
         near |= {f"ipopt.{what}": 1e-6 for what in ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")}
-        self.near = ca.nlpsol("near", "ipopt", nlp, {**options, **derivatives, **near}) if model.smoothed else self.warm
-        self.cold: ca.Function | WorkingSet = all_rows
+        self.near = self.warm
+        if model.smoothed:
+            self.near = WatchedSolver(ca.nlpsol("near", "ipopt", nlp, {**options, **derivatives, **near}), self.watch)
+        self.cold: WatchedSolver | WorkingSet = WatchedSolver(all_rows, self.watch)
         if settings.few_rows and nlp["g"].shape[0] >= LEAST_ROWS:
-            self.cold = self._make_working_set(problem, general, all_rows)
+            self.cold = self._make_working_set(problem, general, self.cold)
         self.create_s = time.perf_counter() - started
 
-    def _make_working_set(self, problem: GaitProblem, options: Mapping[str, Any], whole: ca.Function) -> WorkingSet:
+    def _make_working_set(self, problem: GaitProblem, options: Mapping[str, Any], whole: WatchedSolver) -> WorkingSet:
         """Make a first stage that begins with few rows: ties of lifted variables, equations, and rows that one run needs.
 
         That run uses the parameters' defaults, so that it does not depend on which copy of the problem is solved first.
@@ -260,7 +269,7 @@ class Ipopt(Solver):
         return outcome
 
     def _run_stage(
-        self, run: "_Run", method: "ca.Function | WorkingSet", width: float, start: dict[str, Array]
+        self, run: "_Run", method: "WatchedSolver | WorkingSet", width: float, start: dict[str, Array]
     ) -> Guess:
         """Run one stage, and add its effort to that of the run."""
         result = method(p=np.append(run.problem.p, width), **start, **run.bounds)

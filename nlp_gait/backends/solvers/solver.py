@@ -1,10 +1,11 @@
 """The interface of an NLP solver: one run of a problem from one start point; and a callback that ends runs."""
 
+import json
 import math
 import threading
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from functools import cache
 from typing import Any, ClassVar, Protocol
@@ -18,9 +19,18 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.interrupts import never
+from nlp_gait.processes import has_fork, run_in_isolation
 
-INTERRUPTED, TIME_IS_UP = "Interrupted", "Maximum_WallTime_Exceeded"
-REASONS = {INTERRUPTED: "was interrupted", TIME_IS_UP: "stopped at the time limit"}
+INTERRUPTED, TIME_IS_UP, KILLED = "Interrupted", "Maximum_WallTime_Exceeded", "Killed"
+REASONS = {
+    INTERRUPTED: "was interrupted",
+    TIME_IS_UP: "stopped at the time limit",
+    KILLED: "was ended within an iteration, after the time limit; iterations and calls of its stage are not counted",
+}
+# Variables from which one iteration may outlast the time limit: of the 15,754 of stairs-track's, one took 591 s.
+LARGE = 5000
+GRACE_S = 5.0  # after the time limit, to finish an iteration
+MOST_BYTES = 2**28  # of what a process returns
 
 
 class Solver(Protocol):
@@ -123,6 +133,26 @@ class IterationWatch(ca.Callback):
         limit_casadi_threads()
         self._of_thread.stop, self._of_thread.deadline, self._of_thread.reason = stop, deadline, ""
 
+    def end(self, reason: str) -> None:
+        """Say why the run of this thread ends."""
+        self._of_thread.reason = reason
+
+    def send_iterates(self, send: Callable[[bytes], bytes]) -> None:
+        """Send all iterates of this thread's run, see ``_pack_iterate``; ``stop`` is asked no more."""
+        self._of_thread.stop, self._of_thread.send = never, send
+
+    @property
+    def stop(self) -> Callable[[], bool]:
+        """Whether to end the run of this thread at once."""
+        stop: Callable[[], bool] = getattr(self._of_thread, "stop", never)
+        return stop
+
+    @property
+    def deadline(self) -> float:
+        """Of the run of this thread, a time of ``time.perf_counter`` [s]."""
+        deadline: float = getattr(self._of_thread, "deadline", math.inf)
+        return deadline
+
     @property
     def reason(self) -> str:
         """Why the watch ended the run of this thread, as IPOPT would report it; empty if it did not."""
@@ -137,12 +167,70 @@ class IterationWatch(ca.Callback):
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
         return ca.Sparsity.dense(self._sizes[ca.nlpsol_out(i)], 1)
 
-    def eval(self, iterate: object) -> list[int]:
+    def eval(self, iterate: Sequence[ca.DM] | None) -> list[int]:
         """Return 1 to end the run, 0 to continue."""
-        stop = getattr(self._of_thread, "stop", never)
-        deadline = getattr(self._of_thread, "deadline", math.inf)
-        if stop():
-            self._of_thread.reason = INTERRUPTED
-        elif time.perf_counter() >= deadline:
-            self._of_thread.reason = TIME_IS_UP
+        send = getattr(self._of_thread, "send", None)
+        if send is not None and iterate is not None:
+            send(_pack_iterate(dict(zip(self._sizes, iterate, strict=True))))
+        if self.stop():
+            self.end(INTERRUPTED)
+        elif time.perf_counter() >= self.deadline:
+            self.end(TIME_IS_UP)
         return [int(bool(self.reason))]
+
+
+class WatchedSolver:
+    """An ``nlpsol`` with its watch, which keeps the time limit of large NLPs within an iteration, too.
+
+    These run in a forked process, which is killed if it does not return within ``GRACE_S`` after the deadline. Its last iterate
+    is then the result.
+    """
+
+    def __init__(self, solver: ca.Function, watch: IterationWatch) -> None:
+        self._solver, self._watch = solver, watch
+        self._stats: Mapping[str, Any] = {}
+
+    def stats(self) -> Mapping[str, Any]:
+        """Return the statistics of the last call, by CasADi's names."""
+        return self._stats
+
+    def __call__(self, **arguments: Any) -> Mapping[str, Any]:
+        """Solve the NLP."""
+        if len(arguments["lbx"]) >= LARGE and has_fork():
+            return self._call_in_fork(arguments)
+        result: Mapping[str, Any] = self._solver(**arguments)
+        self._stats = self._solver.stats()
+        return result
+
+    def _call_in_fork(self, arguments: Mapping[str, Any]) -> Mapping[str, Any]:
+        watch, solver = self._watch, self._solver
+        n, m = len(arguments["lbx"]), len(arguments["lbg"])
+        iterates = [_pack_iterate({"x": arguments["x0"], "lam_x": np.zeros(n), "lam_g": np.zeros(m)})]
+
+        def call(ask: Callable[[bytes], bytes]) -> bytes:
+            watch.send_iterates(ask)
+            result, stats = solver(**arguments), solver.stats()
+            ask(_pack_iterate(result))
+            counts = {name: count for name, count in stats.items() if name.startswith("n_call_")}
+            ending = {name: stats[name] for name in ("iter_count", "return_status", "success")}
+            return json.dumps({"reason": watch.reason, "stats": {**counts, **ending}}).encode()
+
+        def keep(iterate: bytes) -> bytes:
+            iterates[:] = [iterate]
+            return b""
+
+        left = watch.deadline - time.perf_counter() + GRACE_S
+        try:
+            ended = json.loads(run_in_isolation(call, left, MOST_BYTES, answer=keep, stop=watch.stop))
+        except TimeoutError:
+            reason = INTERRUPTED if watch.stop() else KILLED
+            ended = {"reason": reason, "stats": {"iter_count": 0, "return_status": reason, "success": False}}
+        watch.end(ended["reason"])
+        self._stats = ended["stats"]
+        x, lam_x, lam_g = np.split(np.frombuffer(iterates[-1]), (n, 2 * n))
+        return {"x": x, "lam_x": lam_x, "lam_g": lam_g}
+
+
+def _pack_iterate(values: Mapping[str, Any]) -> bytes:
+    """Return x and the multipliers, from which the next stage starts, by CasADi's names."""
+    return np.concatenate([np.asarray(values[name], dtype=float).ravel() for name in ("x", "lam_x", "lam_g")]).tobytes()

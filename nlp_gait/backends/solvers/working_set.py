@@ -15,7 +15,7 @@ from casadi import MX
 from numpy.typing import NDArray
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, NO_OTHERS
-from nlp_gait.backends.solvers.solver import IterationWatch
+from nlp_gait.backends.solvers.solver import IterationWatch, WatchedSolver
 from nlp_gait.formulation import Array
 
 Rows = NDArray[np.bool_]
@@ -34,7 +34,7 @@ class WorkingSet:
         nlp: Mapping[str, MX],
         functions: Mapping[str, ca.Function],
         options: Mapping[str, Any],
-        whole: ca.Function,
+        whole: WatchedSolver,
         watch: IterationWatch,
         always: Rows,
     ) -> None:
@@ -73,7 +73,7 @@ class WorkingSet:
         rows, start = self._begin, arguments["x0"]
         for _ in range(ROUNDS):
             chosen = np.flatnonzero(rows)
-            solver, _ = self._get_solver(rows.tobytes())
+            solver = self._get_solver(rows.tobytes())
             sides = {side: np.asarray(arguments[side])[chosen] for side in ("lbg", "ubg")}
             solved = solver(**{**arguments, **sides, "x0": start})
             stats = solver.stats()
@@ -103,7 +103,7 @@ class WorkingSet:
             for name, value in stats.items()
         }
 
-    def _make_solver(self, chosen: bytes) -> tuple[ca.Function, IterationWatch]:
+    def _make_solver(self, chosen: bytes) -> WatchedSolver:
         """Make IPOPT on some of the rows, within milliseconds: it uses parts of the results of the functions of all rows."""
         rows = np.flatnonzero(np.frombuffer(chosen, dtype=bool)).tolist()
         functions, x, p = self._functions, self._nlp["x"], self._nlp["p"]
@@ -119,4 +119,4 @@ class WorkingSet:
             derivatives["hess_lag"] = ca.Function(DERIVATIVES["hess_lag"], [x, p, weight, weights], [hessian])
         watch = IterationWatch(nlp, shared=self._watch)
         options = {**self._options, **NO_OTHERS, **derivatives, "iteration_callback": watch}
-        return ca.nlpsol("some_rows", "ipopt", nlp, options), watch
+        return WatchedSolver(ca.nlpsol("some_rows", "ipopt", nlp, options), watch)

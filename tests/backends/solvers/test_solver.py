@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+import casadi as ca
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
@@ -15,7 +16,7 @@ from nlp_gait.backends.solvers import nlpsol
 from nlp_gait.backends.solvers import solver as solver_module
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.registry import make_solver
-from nlp_gait.backends.solvers.solver import CasadiBlas, IterationWatch
+from nlp_gait.backends.solvers.solver import CasadiBlas, IterationWatch, WatchedSolver
 from nlp_gait.errors import InputError
 
 WALK = ProblemSpec(name="walk12")
@@ -49,6 +50,44 @@ def test_linear_algebra_of_ipopt_has_one_thread_whatever_the_process_has() -> No
     nlp_gait.solve(nlp_gait.load("walk12"))
     threads = {library["internal_api"]: library["num_threads"] for library in threadpool_info()}
     assert threads[CasadiBlas.internal_api] == 1
+
+
+class Stuck(ca.Callback):
+    """Zero; from the twentieth call on it takes a minute, like a factorisation that runs out of memory again and again."""
+
+    def __init__(self) -> None:
+        ca.Callback.__init__(self)
+        self.calls = 0
+        self.construct("stuck")
+
+    def eval(self, _: object) -> list[float]:
+        self.calls += 1
+        time.sleep(0.0 if self.calls < 20 else 60.0)
+        return [0.0]
+
+    def has_jacobian(self) -> bool:
+        return True
+
+    def get_jacobian(self, name: str, *_: object) -> ca.Function:
+        x, y = ca.MX.sym("x"), ca.MX.sym("y")
+        return ca.Function(name, [x, y], [ca.MX(1, 1)])
+
+
+@pytest.mark.parametrize("presses", [False, True])
+def test_an_iteration_of_a_large_problem_that_does_not_end_is_killed(presses: bool) -> None:
+    """At the limit and a grace, or at Ctrl-C; the last iterate remains."""
+    x, stuck = ca.MX.sym("x", solver_module.LARGE), Stuck()
+    nlp = {"x": x, "f": ca.sumsqr((x - 1) ** 2) + stuck(x[0]), "p": ca.MX.sym("p"), "g": x[0]}
+    watch = IterationWatch(nlp)
+    options = {"ipopt.hessian_approximation": "limited-memory", "ipopt.print_level": 0, "print_time": False}
+    solver = WatchedSolver(ca.nlpsol("solver", "ipopt", nlp, {**options, "iteration_callback": watch}), watch)
+    started = time.perf_counter()
+    watch.begin(lambda: presses and time.perf_counter() > started + 1.0, started + (60.0 if presses else 1.0))
+    start = np.zeros(solver_module.LARGE)
+    result = solver(x0=start, p=0.0, lbx=start - 9.0, ubx=start + 9.0, lbg=[-9.0], ubg=[9.0])
+    assert time.perf_counter() - started < 10.0 + solver_module.GRACE_S
+    assert watch.reason == ("Interrupted" if presses else "Killed") and not solver.stats()["success"]
+    assert result["x"].min() > 0.0  # it has moved
 
 
 @pytest.mark.slow
