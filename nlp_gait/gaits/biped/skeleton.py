@@ -41,6 +41,11 @@ def list_limbs(robot: Robot) -> list[tuple[str, list[str]]]:
         chain, place = _list_chain(robot, end), _place_at_zero(robot, end)
         if not legs & {end, *chain[1:]} and np.linalg.norm(place) >= SHORTEST_SHARE * height:
             side = TRUNK if abs(place[1]) < 0.1 * height else LEFT if place[1] > 0 else RIGHT
+            sideways = next((k for k, name in enumerate(chain[1:], 1) if robot.joint_to[name].origin_m[1]), 0)
+            if sideways:  # an arm, which begins in the middle of the trunk
+                middle = f"between {chain[sideways]}"
+                limbs.append((TRUNK, [*chain[:sideways], middle]))
+                chain = [middle, *chain[sideways:]]
             limbs.append((side, [*chain, f"{end} tip"]))
     return limbs
 
@@ -65,7 +70,10 @@ def _place_at_zero(robot: Robot, link: str) -> Array:
 
 
 def place_links(robot: Robot, angles: Mapping[str, SX], left_ankle: SX) -> dict[str, SX]:
-    """Return places (3,) of every link's joint and tip, its centre of mass, from the left ankle [m]; other joints are at zero."""
+    """Return places (3,) from the left ankle [m], other joints at zero.
+
+    They are every link's joint, its tip, which is its centre of mass, and the point of its parent's sagittal plane beside it.
+    """
     tree = make_tree(robot, robot.feet[LEFT].link)
     places: dict[str, SX] = {}
     poses = forward_kinematics(tree, dict.fromkeys(robot.joints, SX(0)) | dict(angles), left_ankle)
@@ -76,6 +84,10 @@ def place_links(robot: Robot, angles: Mapping[str, SX], left_ankle: SX) -> dict[
         offset = np.array(body.com_offset_m) - np.array(body.link.com_m) if upwards or joint is None else np.zeros(3)
         places[body.link.name] = pose.position + pose.rotation @ ca.DM(offset)
         places[f"{body.link.name} tip"] = pose.com
+        for child in (joint for joint in robot.joints.values() if joint.parent == body.link.name):
+            forward, _, up = child.origin_m
+            middle = ca.DM([forward, 0.0, up])
+            places[f"between {child.child}"] = places[body.link.name] + pose.rotation @ middle
     return places
 
 
