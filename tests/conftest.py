@@ -5,20 +5,13 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache, wraps
-from typing import Any
 
 import pytest
 from hypothesis import settings
-from typer.main import get_command
 
 from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.formulation import GaitProblem, registry
-from nlp_gait.providers import PROBLEMS
-from nlp_gait.robots.loading import is_robot_file
-from tests.compilers import hide_compilers
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.
 settings.register_profile("reproducible", derandomize=True, deadline=None)
@@ -69,86 +62,34 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 @contextmanager
-def _replace_pictures(name: str) -> Iterator[None]:
-    from tests.compare import pictures  # Matplotlib takes half of the time of an empty run
+def _draw_coarsely() -> Iterator[None]:
+    from matplotlib.backend_bases import get_registered_canvas_class, register_backend
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("compare.report.writing.render_svg", getattr(pictures, name))
-        yield
+    from tests.compare.pictures import CoarseCanvas  # Matplotlib takes half of the time of an empty run
+
+    usual = get_registered_canvas_class("svg")
+    register_backend("svg", CoarseCanvas)
+    yield
+    register_backend("svg", usual)
 
 
 @pytest.fixture(scope="module")
 def coarse_pages() -> Iterator[None]:
     """Draw each picture of a page once and small, for files whose tests do not measure the pictures of their pages."""
-    with _replace_pictures("render_coarsely"):
+    with _draw_coarsely():
         yield
 
 
 @pytest.fixture
 def coarse_pictures() -> Iterator[None]:
     """Do so for a test."""
-    with _replace_pictures("render_coarsely"):
-        yield
-
-
-@pytest.fixture(scope="module")
-def undrawn_pages() -> Iterator[None]:
-    """Draw none, for files about commands and records, whose pictures are drawn by the tests of reports and questions."""
-    with _replace_pictures("render_nothing"):
-        yield
-
-
-@pytest.fixture
-def undrawn_pictures() -> Iterator[None]:
-    """Do so for a test."""
-    with _replace_pictures("render_nothing"):
+    with _draw_coarsely():
         yield
 
 
 @pytest.fixture
 def without_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let no compiler be found."""
-    hide_compilers(monkeypatch)
-
-
-@pytest.fixture(scope="session", autouse=True)
-def commands_declared_once() -> Iterator[None]:
-    """Typer makes the commands from their declarations once, not at each call."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("typer.testing._get_command", cache(get_command))
-        yield
-
-
-@pytest.fixture(scope="session", autouse=True)
-def built_once() -> Iterator[None]:
-    """Every problem of the package is loaded once for all tests, with all that is built from it.
-
-    What is built from a problem's mathematics never changes, so that copies share it in use too. A robot file is always read
-    again: the file of another test may have the same name.
-    """
-    find = registry.find_maker
-
-    @cache
-    def made(name: str, options: tuple[tuple[str, str, Any], ...]) -> GaitProblem:
-        return find(name)(**{option: value for option, _, value in options})
-
-    @cache
-    def shared_maker(name: str) -> Callable[..., GaitProblem]:
-        make = find(name)
-
-        @wraps(make)
-        def shared(**options: Any) -> GaitProblem:
-            robot = options.get("robot", "")
-            if isinstance(robot, str) and is_robot_file(robot):
-                return make(**options)
-            registry.check_options(make, options)  # first, for what is not hashable
-            return made(name, tuple((option, type(value).__name__, value) for option, value in options.items()))
-
-        return shared
-
-    def maker_of(name: str) -> Callable[..., GaitProblem]:
-        return shared_maker(name) if name in PROBLEMS else find(name)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(registry, "find_maker", maker_of)
-        yield
+    """Let no compiler be found; Zig's is a package, not a program of the path."""
+    for name, value in (("CXX", ""), ("CC", ""), ("PATH", "no-programs")):
+        monkeypatch.setenv(name, value)
+    monkeypatch.setitem(sys.modules, "ziglang", None)

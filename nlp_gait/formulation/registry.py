@@ -185,12 +185,22 @@ def _list_choices(make: Maker) -> dict[str, tuple[str, ...]]:
 def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
     """Return a problem by name, see ``find_maker``, built with the given options; the others keep their defaults.
 
-    An instance of GaitBench is a problem, too: ``load("ssp-v5")``, ``load("gb2:ssp:3")``. Raises UnknownNameError,
-    and InputError for a value that the option does not allow, or user code that fails.
+    An instance of GaitBench is a problem, too: ``load("ssp-v5")``, ``load("gb2:ssp:3")``. A problem of this package with equal
+    options is made once, unless they name a file. Raises UnknownNameError, and InputError for a value that the option does not
+    allow, or user code that fails.
     """
     check_name("problem", name)
     name, instance = resolve_name(name)
-    return find_maker(name)(**{**instance, **options})
+    make, options = find_maker(name), {**instance, **options}
+    if name not in PROBLEMS:
+        return make(**options)
+    check_options(make, options)  # first, for what is not hashable
+    return make(**options) if hash_files(options) else _make_once(make, **options)
+
+
+@functools.lru_cache(maxsize=64, typed=True)
+def _make_once(make: Maker, /, **options: Any) -> GaitProblem:
+    return make(**options)
 
 
 def resolve_name(name: str) -> tuple[str, dict[str, str]]:

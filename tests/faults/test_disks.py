@@ -29,7 +29,7 @@ WALK = ProblemSpec(name="walk12")
 
 @pytest.mark.slow
 def test_a_study_stores_its_finished_runs_and_continues_when_there_is_room(
-    tmp_path: Path, undrawn_pictures: None
+    tmp_path: Path, coarse_pictures: None
 ) -> None:
     study = "walk12 --algorithms random --runs 20 --evaluations 100 --starts 0 --jobs 1"
     script = (

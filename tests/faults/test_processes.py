@@ -146,7 +146,7 @@ def test_durations_do_not_follow_the_clock_on_the_wall(tmp_path: Path, monkeypat
 
 
 @pytest.mark.slow
-def test_a_limit_of_open_files_is_one_sentence_and_keeps_runs(tmp_path: Path, undrawn_pictures: None) -> None:
+def test_a_limit_of_open_files_is_one_sentence_and_keeps_runs(tmp_path: Path, coarse_pictures: None) -> None:
     line = f"compare walk12 --algorithms random --starts 0 --evaluations 60 --out {tmp_path} --jobs"
     calls.nlp_gait(*line.split(), "1", "--runs", "2")
     command = f'ulimit -n 24; exec "{sys.executable}" -m nlp_gait {line} 20 --runs 22'

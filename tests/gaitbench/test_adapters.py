@@ -81,7 +81,7 @@ def test_pycma(instance: gaitbench.Instance, tmp_path: Path, monkeypatch: pytest
 def test_a_package_that_lacks_is_named(
     name: str, instance: gaitbench.Instance, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("nlp_gait.gaitbench.adapters.find_spec", lambda package: None)
+    monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(MissingExtraError, match=rf"to\('{name}'\) needs the package {name}.*nlp-gait\[algorithms\]"):
         instance.to(name)
     with pytest.raises(UnknownNameError, match=f"unknown adapter '{name}x'; did you mean '{name}'"):

@@ -26,7 +26,8 @@ from tests.metaheuristics.problems import disc, sphere
 
 def test_a_package_that_is_missing_is_named_and_left_out_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {"lshade", "cma", "pymoo:GA"} <= set(list_installed_algorithms())
-    monkeypatch.setattr("metaheuristics.settings.find_spec", lambda name: None)
+    for package in ("cma", "pymoo"):
+        monkeypatch.setitem(sys.modules, package, None)
     assert "lshade" in list_installed_algorithms() and not {"cma", "pymoo:GA"} & set(list_installed_algorithms())
     for name, package in (("cma", "cma"), ("pymoo:GA", "pymoo")):
         with pytest.raises(

@@ -35,11 +35,6 @@ SEED = 4
 PATHS = 10
 
 
-@pytest.fixture(autouse=True)
-def ship_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(certificates, "find_certificate", lambda description: None)
-
-
 @pytest.fixture(scope="module")
 def problem() -> GaitProblem:
     return nlp_gait.load("walk12", quadrature="simpson").with_values(**{"lambda": LAMBDA})

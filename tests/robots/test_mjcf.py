@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import mujoco
 import pytest
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
-from nlp_gait.robots import load_robot, mjcf
+from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import make_biped_model
 from tests.robots.crooked import crooked, crooked_urdf
 from tests.robots.custom import assert_same
@@ -78,7 +79,7 @@ def test_what_is_ignored_is_reported(path: str, tmp_path: Path, caplog: pytest.L
 
 
 def test_without_mujoco_its_extra_is_named(path: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mjcf, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"MJCF files need MuJoCo.*pip install 'nlp-gait\[sim\]'"):
         load_robot(path)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from nlp_gait.errors import GaitError, MissingExtraError, RobotDataError
-from nlp_gait.robots import load_robot, urdf
+from nlp_gait.robots import load_robot
 from nlp_gait.robots.urdf import read_urdf
 from tests.robots.custom import about_joints, as_urdf, assert_same, humanoid, nao, partner, written
 
@@ -262,6 +263,6 @@ def test_joint_names_that_fit_no_joint_are_refused(tmp_path: Path, names: object
 
 
 def test_without_the_extra_its_name_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(urdf, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "lxml", None)
     with pytest.raises(MissingExtraError, match=r"need the package lxml.*pip install 'nlp-gait\[urdf\]'"):
         read_urdf(stored(tmp_path, as_urdf(nao())))

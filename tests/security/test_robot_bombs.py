@@ -51,15 +51,11 @@ BOMBS = (
 )
 
 
-@pytest.fixture
-def small_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(meshes, "TIME_LIMIT_S", TIME_S)
-    monkeypatch.setattr(meshes, "MEMORY_LIMIT_BYTES", MEMORY_BYTES)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("text", BOMBS)
-def test_a_model_that_takes_too_much_is_rejected(tmp_path: Path, text: str, small_limits: None) -> None:
+def test_a_model_that_takes_too_much_is_rejected(tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(meshes, "TIME_LIMIT_S", TIME_S)
+    monkeypatch.setattr(meshes, "MEMORY_LIMIT_BYTES", MEMORY_BYTES)
     for name in ("pipe", "pipe.obj"):
         os.mkfifo(tmp_path / name)
     (tmp_path / "more.xml").write_text('<mujocoinclude><size nkey="2000000000"/></mujocoinclude>')

@@ -7,6 +7,8 @@ import os
 import stat
 import subprocess
 import sys
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -24,14 +26,16 @@ FLAGS = ("-O0",)
 
 
 @pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     folder = tmp_path / "cache"
     private = tmp_path / "private"
     private.mkdir(mode=0o700)
     monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(folder))
-    monkeypatch.setattr(library_cache, "make_private_folder", functools.cache(lambda: private))
+    monkeypatch.setattr(tempfile, "tempdir", str(private))
+    library_cache.make_private_folder.cache_clear()
     library_cache.warn_once.cache_clear()
-    return folder
+    yield folder
+    library_cache.make_private_folder.cache_clear()
 
 
 @pytest.fixture
@@ -160,7 +164,7 @@ def test_a_compiler_that_is_not_there_is_passed_over(monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("CXX", "no-such-compiler -fast")
     assert find_compiler().command[0] != "no-such-compiler"
     monkeypatch.setattr(compiler_module, "COMMON_NAMES", ())
-    monkeypatch.setattr(compiler_module, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "ziglang", None)
     monkeypatch.setenv("CC", "")
     compiler_module._find.cache_clear()
     with pytest.raises(CompilerError, match="no C\\+\\+ compiler \\(no-such-compiler: not found\\); to get a compiler"):

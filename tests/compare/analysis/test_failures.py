@@ -20,7 +20,7 @@ from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE
 from tests.faults.processes import ROOT
 
 RUN = CliRunner()
-pytestmark = pytest.mark.usefixtures("undrawn_pictures")
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 STUDY = "compare walk12 --algorithms pso,ga --runs 2 --starts 0 --evaluations 100 --jobs 1".split()
 
 

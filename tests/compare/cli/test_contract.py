@@ -1,12 +1,11 @@
 """The command line as scripts use it."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
+from tests.compare.cli.calls import as_json, nlp_gait
 
 PSO_OF_THE_PAPER = "0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4"
 # Verified by two independent implementations to nine digits; the paper's variables are rounded, the values are not.
@@ -74,17 +73,6 @@ def test_fixed_variable_and_parameter():
     assert fixed["parameters"]["lambda"] == 0.3
 
 
-def test_same_seed_same_result_with_one_or_two_processes(tmp_path, undrawn_pages):
-    def search(jobs):
-        call = f"compare nao-ssp --algorithms ga --starts 0 --runs 3 --seed 3 --evaluations 600 --jobs {jobs}"
-        runs = as_json(*call.split(), "--out", tmp_path / jobs)["runs"]
-        assert all({"claimed_violation", "evaluations", "time_s", "verdict"} <= run.keys() for run in runs)
-        return [(run["seed"], run["claimed_objective"], run["x"]) for run in runs]
-
-    runs = search("1")
-    assert [seed for seed, _, _ in runs] == [3, 4, 5] and runs == search("2")
-
-
 def test_unreachable_pose_is_evaluated_and_named():
     x = PSO_OF_THE_PAPER.replace("0.31,", "0.36,", 1)
     result = as_json("evaluate", "nao-ssp", "--x", x)
@@ -95,14 +83,3 @@ def test_unreachable_pose_is_evaluated_and_named():
     ]
     assert "reach[left leg, 5]" in out_of_reach
     assert "reach[left leg, " in nlp_gait("evaluate", "nao-ssp", "--x", x).stdout
-
-
-def test_help_has_examples():
-    for command in ("evaluate", "solve", "compare", "list"):
-        assert f"nlp-gait {command}" in nlp_gait(command, "--help", COLUMNS="200").stdout
-
-
-def test_out_is_checked_before_the_work(tmp_path):
-    blocked: Path = tmp_path / "file"
-    blocked.write_text("")
-    assert "cannot write" in one_sentence("compare", "nao-ssp", "--evaluations", "100000000", "--out", blocked)

@@ -10,7 +10,7 @@ from compare.bench.baseline import BASELINE
 from nlp_gait import gaitbench
 from tests.compare.cli.calls import as_json, nlp_gait
 
-pytestmark = pytest.mark.usefixtures("undrawn_pictures")
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 ID = "walk12-w015"
 # What a user brings: an algorithm with ask and tell, and a plain function around a library's optimiser.
@@ -119,20 +119,10 @@ def test_instances_are_problems_everywhere(tmp_path: Path) -> None:
     assert any(name.endswith("gaitbench_gb2_walk12_long_3.h") for name in found["files"])
 
 
-def test_export_objective_writes_and_says_what(tmp_path: Path) -> None:
-    found = as_json("export", ID, "--to", "objective", "--out", tmp_path / "c")
-    assert {Path(name).suffix for name in found["files"]} == {".cpp", ".h", ".c", ".m", ".jl", ".sh"}
-    assert all(Path(name).is_file() for name in found["files"])
-
-
-def test_export_solver_writes_and_says_what(tmp_path: Path) -> None:
-    found = as_json("export", "walk12", "--to", "solver", "--out", tmp_path / "c")
-    assert sorted(Path(name).suffix for name in found["files"]) == [".c", ".cpp", ".h", ".sh"]
-    assert all(Path(name).is_file() for name in found["files"])
-
-
-def test_an_instance_is_a_problem_of_every_command(tmp_path: Path) -> None:
-    """``evaluate`` and ``list`` know it by its option."""
-    x = "0.13,0.05,0.02,0.02"
-    found = as_json("evaluate", "gaitbench", "--set", f"instance={ID}", "--x", x)
-    assert found["options"] == {"instance": ID} and found["feasible"] in (True, False)
+@pytest.mark.parametrize(
+    ("line", "suffixes"),
+    [(f"export {ID} --to objective", ".c .cpp .h .jl .m .sh"), ("export walk12 --to solver", ".c .cpp .h .sh")],
+)
+def test_export_writes_and_says_what(line: str, suffixes: str, tmp_path: Path) -> None:
+    files = list(map(Path, as_json(*line.split(), "--out", tmp_path / "c")["files"]))
+    assert sorted({path.suffix for path in files}) == suffixes.split() and all(path.is_file() for path in files)

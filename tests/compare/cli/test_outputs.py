@@ -168,12 +168,6 @@ def test_robots_and_code_that_no_record_could_name_are_refused(tmp_path: Path) -
             load(problem, **options)
 
 
-@pytest.mark.parametrize("path", [".", "nosuch/..", "/"])
-def test_a_folder_in_place_of_a_result_is_reported(path: str) -> None:
-    for command in (["export", path, "--to", "gif"], ["export", path, "--to", "csv"], ["simulate", path]):
-        assert "cannot be read" in one_sentence(*command)
-
-
 @pytest.mark.slow
 def test_no_room_for_temporary_files_is_one_sentence(tmp_path: Path) -> None:
     inside = Path(sys.executable).is_relative_to(ROOT)

@@ -28,7 +28,7 @@ def read_points(study: str) -> dict[str, object]:
     }
 
 
-def test_a_program_takes_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn_pictures: None) -> None:
+def test_a_program_takes_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coarse_pictures: None) -> None:
     monkeypatch.chdir(tmp_path)
     Path("my_search.py").write_text(PROGRAM)
     Path("shared.py").write_text("ROWS = 20\n")

@@ -12,7 +12,7 @@ import pytest
 from compare.cli.compare import list_solver_names
 from tests.compare.cli.calls import as_json, nlp_gait
 
-pytestmark = pytest.mark.usefixtures("undrawn_pages")
+pytestmark = pytest.mark.usefixtures("coarse_pages")
 
 STUDY = """
 runs = 1
@@ -30,7 +30,7 @@ settings = {population = 20}
 
 
 @pytest.fixture(scope="module")
-def folder(undrawn_pages: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(coarse_pages: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("study")
     (out / "study.toml").write_text(STUDY)
     done = as_json("compare", "--config", out / "study.toml", "--out", out / "out", "--jobs", "1")

@@ -27,7 +27,7 @@ polish = true
 
 
 @pytest.fixture
-def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn_pictures: None) -> Path:
+def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coarse_pictures: None) -> Path:
     monkeypatch.chdir(tmp_path)
     shutil.copy(EXAMPLE, tmp_path / "my.py")
     return tmp_path / "my.py"

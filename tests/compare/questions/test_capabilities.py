@@ -12,7 +12,6 @@ from compare.questions.question import Work, find
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable, load
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from tests.compare.cli.calls import one_sentence
 from tests.robots.crooked import crooked
 
 MOST_ACCELERATION, LONGEST = 0.32, 0.5  # [m/s^2], [m]
@@ -92,10 +91,3 @@ def test_robots_that_turn_have_a_sharpest_turn(tmp_path: Path) -> None:
     (sentence,) = describe_sharpest_turn(load("humanoid-cycle", robot=crooked(tmp_path), intervals=2))
     assert sentence.startswith("sharpest turn that joints and soles allow: ") and "if it is sharper, " in sentence
     assert not describe_sharpest_turn(load("humanoid-cycle", intervals=2))
-
-
-def test_the_command_takes_axes_or_capabilities(tmp_path: Path) -> None:
-    error = one_sentence("sweep", "nao-cycle", "--out", str(tmp_path))
-    assert "either --over NAME=LOW:HIGH:COUNT or --capabilities" in error
-    error = one_sentence("sweep", "nao-dsp", "--capabilities", "--out", str(tmp_path))
-    assert "nao-dsp has no variable 'step_length_m'" in error

@@ -29,7 +29,7 @@ from nlp_gait.files import replace_nan
 from nlp_gait.formulation import GaitProblem
 from tests.compare.questions.test_capabilities import make_walk
 
-pytestmark = pytest.mark.usefixtures("undrawn_pictures")
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 TIMES = ("time_s", "cpu_s", "run_time_s", "files")
 ARM = {"swing_height_m": 0.015, "hip_height_m": 0.31, "hip_vx_start_m_s": 0.0124, "hip_vx_end_m_s": 0.001}

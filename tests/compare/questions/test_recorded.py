@@ -23,12 +23,6 @@ pytestmark = pytest.mark.usefixtures("coarse_pictures")
 X = (0.31, -0.002, 0.0034, 0.008, 0.0025, 0.0243, -0.0256, 0.015, 4.0)
 
 
-@pytest.fixture(autouse=True)
-def one_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of the optimum, whose least power is not what is tested."""
-    monkeypatch.setattr(module, "STARTS", 1)
-
-
 @pytest.fixture(scope="module")
 def gait(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("gait") / "gait.csv"

@@ -5,11 +5,9 @@ from __future__ import annotations
 import pytest
 
 from compare.questions.question import Work
-from compare.questions.robust import Robust
 from compare.questions.robust_gait import make_boxes, solve_robust
 from nlp_gait import load
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.errors import InputError
 
 
 def test_a_gait_for_every_sole() -> None:
@@ -35,8 +33,3 @@ def test_boxes_grow_and_name_every_link() -> None:
     soles, whole, links = make_boxes(load("nao-ssp"), 0.05, 0.002).values()
     assert set(soles) < set(whole) and set(soles) < set(links)
     assert links["LThigh.mass"] == 0.05 and whole["mass"] == 0.05 and soles["sole_y_m"] == 0.002
-
-
-def test_problems_without_a_robot_are_refused() -> None:
-    with pytest.raises(InputError, match="problem 'walk12' has no robot that could be uncertain"):
-        Robust(problem=load("walk12"))

@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 from compare.cli import app
 from compare.questions.question import find
 from compare.questions.variants import (
-    MOTORS,
     SolvedVariant,
     Variant,
     Variants,
@@ -117,26 +116,6 @@ def test_values_of_an_option_of_any_problem(tmp_path: Path) -> None:
     short, long = answer["variants"]
     assert short["options"] == {"step_length_m": 0.05} and short["objective"] < long["objective"]
     assert np.isfinite(short["moved"])
-
-
-def test_the_first_set_of_motors_is_the_published_one() -> None:
-    assert MOTORS[0].options == {"motors": ""} and len(MOTORS) == 8
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["walk12", "--over", "motors"], "unknown option of walk12 'motors'"),
-        (["nao-ssp", "--over", "speed"], "--over takes motors, trajectory or OPTION"),
-        (["nao-ssp"], "name at least two variants"),
-        (["nao-ssp", "--variant", "fast:speed"], "--variant NAME: takes NAME=VALUE"),
-        (["nao-ssp", "--variant", "fast:speed=3"], "unknown option of nao-ssp 'speed'"),
-        (["nao-ssp", *["--variant", "a:motors=limits"] * 2], "each with its own name"),
-    ],
-)
-def test_others_are_rejected(arguments: list[str], message: str, tmp_path: Path) -> None:
-    done = RUN.invoke(app, ["variants", *arguments, "--out", str(tmp_path)])
-    assert done.exit_code == 1 and message in done.stderr
 
 
 def test_variants_need_names(problem: GaitProblem) -> None:

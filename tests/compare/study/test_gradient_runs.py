@@ -10,17 +10,13 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from compare.study.run_study import Study, run_study
 from compare.study.run_task import run_task
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solvers import nlpsol
-from nlp_gait.backends.solvers.ipopt import Ipopt, IpoptSettings
 from nlp_gait.backends.solvers.registry import make_solver
 from nlp_gait.backends.solvers.solver import IterationWatch
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.formulation import GaitProblem
-from tests.compare.records import POWER
 
 SSP = ProblemSpec(name="nao-ssp")
 OPTIMUM = 0.845868
@@ -98,26 +94,3 @@ def test_a_solver_that_crashes_while_probed_is_a_reason(monkeypatch: pytest.Monk
         nlpsol.probe.cache_clear()
     with pytest.raises(UnknownNameError, match="unknown NLP solver 'snop'"):
         make_solver("snop")
-
-
-@pytest.mark.slow
-def test_a_run_does_not_depend_on_how_many_others_a_study_has(monkeypatch: pytest.MonkeyPatch) -> None:
-    planned = []
-    prepare = IpoptSettings.prepare
-
-    def watched(settings: IpoptSettings, problem: GaitProblem, solves: int = 1) -> Ipopt:
-        planned.append(solves)
-        return prepare(settings, problem, solves)
-
-    monkeypatch.setattr(IpoptSettings, "prepare", watched)
-    tasks = [Task(problem=ProblemSpec(name="walk12"), solver="ipopt", run=run) for run in range(2)]
-    for count in (1, 2):
-        run_study(Study(tasks=tasks[:count], jobs=1))
-    assert len(planned) == 5 and len(set(planned)) == 1
-
-
-@pytest.mark.slow
-def test_a_gradient_run_charges_all_its_calls() -> None:
-    record = run_task(Task(problem=SSP, solver="ipopt"))
-    assert record.history.evaluations == (record.evaluations["f"],) and record.active_constraints
-    assert record.inputs.objective == POWER

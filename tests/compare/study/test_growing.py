@@ -14,11 +14,10 @@ import pytest
 
 from compare.study.evidence import read_evidence
 from compare.study.record import RunRecord
-from compare.study.record_files import RECORDS, locate_record, read_records
+from compare.study.record_files import RECORDS, read_records
 from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings, read_manifest
 from compare.study.task import Handling, ProblemSpec, Stop, Task, hash_solver_source
-from nlp_gait.errors import InputError
 from tests.robots.custom import humanoid
 
 PSO, GA = SolverSpec(name="pso"), SolverSpec(name="ga")
@@ -83,13 +82,6 @@ def test_another_version_of_the_code_is_another_input(tmp_path: Path) -> None:
     assert mine.inputs().key == edited
 
 
-def test_a_solver_that_is_left_out_stays_in_the_report(tmp_path: Path) -> None:
-    grow(tmp_path, STUDY)
-    records, stored = grow(tmp_path, replace(STUDY, solvers=(PSO,)))
-    assert {r.solver for r in records} == {"pso"} and stored == 2
-    assert {r.solver for r in read_records(tmp_path)} == {"pso", "ga"}
-
-
 def test_without_a_list_runs_of_one_name_and_other_inputs_are_not_mixed(tmp_path: Path) -> None:
     grow(tmp_path, replace(STUDY, solvers=(PSO,)))
     grow(tmp_path, replace(STUDY, solvers=(PSO,), stop=Stop(evaluations=300)))
@@ -133,15 +125,6 @@ def test_a_robot_is_its_content_wherever_its_file_lies(
     assert stored == 0 and second.verdict.objective != first.verdict.objective
     monkeypatch.chdir(tmp_path)
     assert grow(out, study("my.json"))[1] == 1
-
-
-def test_a_copy_of_a_record_under_another_name_is_refused(tmp_path: Path) -> None:
-    grow(tmp_path, STUDY)
-    path = locate_record(tmp_path, STUDY.tasks()[0])
-    (tmp_path / "study.json").unlink()
-    path.with_name("pso-0000-00000000.json").write_text(path.read_text())
-    with pytest.raises(InputError, match=f"belongs to walk12/{path.name}; rename or delete it"):
-        read_records(tmp_path)
 
 
 def test_the_list_of_runs_has_each_once_in_any_order_of_commands(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec, Stop
 from nlp_gait.errors import GaitError
-from tests.compare.cli.calls import as_json, nlp_gait
+from tests.compare.cli.calls import nlp_gait
 
 pytestmark = pytest.mark.usefixtures("coarse_pages")
 
@@ -180,21 +180,6 @@ def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_pat
 def test_impossible_numbers_are_refused(column: str, value: object, message: str, tmp_path: Path) -> None:
     with pytest.raises(GaitError, match=message):
         import_runs(WALK, finals(tmp_path, extra={column: [value, 1, 2]}), "ga", evaluations=3)
-
-
-@pytest.mark.slow
-def test_the_commands(tmp_path: Path) -> None:
-    path = finals(tmp_path)
-    found = as_json("evaluate", "walk12", "--x", path, "--csv", tmp_path / "judged.csv")
-    assert [p["objective"]["value"] for p in found["points"]] == [
-        evaluate(PROBLEM, x).objective["value"] for x in POINTS
-    ]
-    assert len((tmp_path / "judged.csv").read_text().splitlines()) == 4
-    out = tmp_path / "study"
-    done = nlp_gait("import", "walk12", path, "--as", "GA (MATLAB)", "--evaluations", "100", "--out", out)
-    assert "GA (MATLAB)" in done.stdout
-    (record,) = (out / "records" / "walk12").glob("GA (MATLAB)-0002-*.json")
-    assert json.loads(record.read_text())["status"] == "imported from finals.csv"
 
 
 @pytest.mark.parametrize(

@@ -98,13 +98,6 @@ def test_a_value_that_is_not_finite_at_a_feasible_point_is_a_failure(tmp_path: P
     assert len(read_records(tmp_path)) == 4
 
 
-@pytest.mark.parametrize("seed", [2**63, 2**63 - 1, 2**70, 10**30])
-def test_seeds_beyond_64_bits_are_rejected_before_the_work(seed: int) -> None:
-    tasks = tuple(replace(TASK, seed=seed, run=run) for run in (1, 0))
-    with pytest.raises(InputError, match="64 bits"):
-        check_study(Study(tasks=tasks))
-
-
 @pytest.mark.parametrize("value", [2**70, deep(60), "\udce9", {"a": "\ud83d"}])
 def test_settings_that_no_record_can_contain_are_rejected_before_the_work(tmp_path: Path, value: Any) -> None:
     (tmp_path / "own.py").write_text("def search(f, lower, upper, evaluations, seed, setting): ...\n")

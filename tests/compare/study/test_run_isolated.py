@@ -14,13 +14,11 @@ from typing import Any
 
 import pytest
 
-from compare.study import run_task as module
 from compare.study.record import RunRecord
 from compare.study.run_task import try_task
 from compare.study.task import ProblemSpec, Stop, Task
 
 STOP = Stop(evaluations=20, time_limit_s=60.0)
-IMPATIENT = Stop(evaluations=20, time_limit_s=0.05)
 
 pytestmark = pytest.mark.skipif(
     "fork" not in multiprocessing.get_all_start_methods(), reason="processes cannot be copied here"
@@ -55,27 +53,6 @@ def test_a_run_has_its_own_process_and_session_and_no_output(task: Task, capfd: 
 def test_without_a_time_limit_it_is_waited_for(task: Task) -> None:
     endless = replace(task, stop=Stop(evaluations=20))
     assert status(endless, lambda: time.sleep(0.3) or "late") == "late"
-
-
-@pytest.mark.slow
-def test_after_its_time_limit_it_is_killed(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
-    impatient = replace(task, stop=IMPATIENT)
-    monkeypatch.setattr(module, "GRACE_S", 0.1)
-    assert status(impatient, lambda: time.sleep(60)) == "it did not return within 0.1 s after the time limit of 0.05 s"
-    monkeypatch.setattr(module, "GRACE_S", 60.0)
-    assert status(impatient, lambda: time.sleep(0.3) or "within the grace") == "within the grace"
-
-
-@pytest.mark.parametrize(
-    ("end", "message"),
-    [
-        (lambda: os._exit(0), "its process ended without a result, by status 0"),
-        (lambda: os._exit(3), "its process ended without a result, by status 3"),
-        (lambda: os.kill(os.getpid(), signal.SIGKILL), "its process ended without a result, by signal SIGKILL"),
-    ],
-)
-def test_how_a_process_ended_is_reported(end: Callable[[], object], message: str, task: Task) -> None:
-    assert status(task, end) == message
 
 
 class Rubbish:

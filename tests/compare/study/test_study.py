@@ -17,7 +17,6 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-import compare.study.run_study
 from compare.study.record import SCHEMA, read_record
 from compare.study.record_files import locate_record, read_records
 from compare.study.run_study import Study, run_study
@@ -83,13 +82,6 @@ def test_a_polished_run_carries_the_search_before_it(undisturbed: Path) -> None:
     assert polished.time_s.solve > search.time_s.solve
     assert polished.time_s.history[:-1] == search.time_s.history  # it is that run, not a repeated one
     assert polished.active_constraints and not search.active_constraints
-
-
-def test_finished_runs_are_kept_and_not_run_again(undisturbed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compare.study.run_study, "try_task", lambda *_: pytest.fail("run twice"))
-    kept: list[int] = []
-    records = run_study(Study(tasks=SMALL.tasks(), folder=undisturbed), on_stored=kept.append)
-    assert kept == [8] and [r.run for r in records] == [task.run for task in SMALL.tasks()]
 
 
 def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
@@ -194,6 +186,7 @@ def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -
         (Task(problem=SSP, solver="pso", handling=Handling(name="debb")), "unknown constraint handling 'debb'"),
         (Task(problem=SSP, solver="ipopt", stop=Stop(time_limit_s=0.0)), "time_limit_s must be"),
         (Task(problem=SSP, solver="pso", label="../../etc"), "label has 1 to 64 letters"),
+        (Task(problem=SSP, solver="pso", seed=2**63 - 1, run=1), "64 bits"),
         (Task(problem=ProblemSpec(name="nao-spp"), solver="pso"), "unknown problem"),
         (Task(problem=SSP, solver="pymoo:XYZ"), "unknown algorithm 'pymoo:XYZ'"),
         (Task(problem=SSP, solver="none.py:A"), "cannot be read: No such file"),

@@ -1,4 +1,4 @@
-"""What every command refuses: one sentence that names what is wrong and what is allowed, before anything is written."""
+"""What every command keeps: help with an example, texts and limits of its options, and one sentence for what it refuses."""
 
 from __future__ import annotations
 
@@ -7,8 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.compare.cli.calls import is_one_sentence, one_sentence, process
+from compare.cli import PANELS, REPLACEMENTS, load_command
+from tests.compare.cli.calls import is_one_sentence, nlp_gait, one_sentence, process
 from tests.compare.records import DSP_X
+
+COMMANDS = {name: load_command(name) for commands in PANELS.values() for name in commands}
+each_command = pytest.mark.parametrize("name", COMMANDS)
 
 POINT = "0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4"
 BENCH = "bench --out {new} --instances walk12-w015"
@@ -71,7 +75,56 @@ REFUSED = {
     "simulate {gait} --drive fast": "unknown drive 'fast'|feed-forward",
     "simulate {gait} --drive absent.toml": "drive 'absent.toml' cannot be read",
     "simulate {gait} --push 1": "--push takes X,Y or X,Y,S, got '1'",
+    "import walk12 {new}/none.csv --as ga": "cannot be read",
+    "verify {new}/missing.zip": "missing.zip' cannot be read: No such file",
+    "prices nao-spp --out {new}": "unknown problem 'nao-spp'",
+    "certainty nao-spp --out {new}": "unknown problem 'nao-spp'",
+    "robust walk12 --out {new}": "problem 'walk12' has no robot that could be uncertain",
+    "sweep nao-cycle --out {new}": "either --over NAME=LOW:HIGH:COUNT or --capabilities",
+    "sweep nao-dsp --capabilities --out {new}": "nao-dsp has no variable 'step_length_m'",
+    "variants walk12 --over motors --out {new}": "unknown option of walk12 'motors'",
+    "variants nao-ssp --over speed --out {new}": "--over takes motors, trajectory or OPTION",
+    "variants nao-ssp --out {new}": "name at least two variants",
+    "variants nao-ssp --variant fast:speed --out {new}": "--variant NAME: takes NAME=VALUE",
+    "variants nao-ssp --variant fast:speed=3 --out {new}": "unknown option of nao-ssp 'speed'",
+    "variants nao-ssp --variant a:motors=limits --variant a:motors=limits --out {new}": "each with its own name",
 }
+
+
+@each_command
+def test_help_has_an_example_and_the_text_and_limits_of_each_option(name: str) -> None:
+    """Click shows the limits of a range in the help; the seed alone has no largest value."""
+    assert f"nlp-gait {name}" in nlp_gait(name, "--help", COLUMNS="200").stdout
+    options = COMMANDS[name].params
+    assert [option.name for option in options if not (option.help or option.metavar)] == []
+    for option in options:
+        kind = option.type_descriptor.annotation
+        assert kind not in (int, float) or option.min is not None, option.name
+        assert kind is not float or option.max is not None, option.name
+
+
+@each_command
+def test_options_of_a_problem_are_the_same_in_all_commands(name: str) -> None:
+    shared = {parameter.opts[0]: parameter.help for parameter in COMMANDS["solve"].params}
+    options = {parameter.opts[0]: parameter.help for parameter in COMMANDS[name].params}
+    if name not in ("list", "plan"):  # robots alone, and the options of its own problem
+        assert all(options[option] == shared[option] for option in options.keys() & {"--robot", "--set"})
+
+
+@each_command
+def test_an_unknown_option_is_named_and_a_refusal_is_below(name: str) -> None:
+    assert "--no-such-option" in nlp_gait(name, "--no-such-option", status=2).stderr
+    assert any(line.split()[0] == name for line in REFUSED)
+
+
+@pytest.mark.parametrize("name", REPLACEMENTS)
+def test_a_removed_name_is_answered_by_its_replacement(name: str) -> None:
+    command, dashes, option = name.partition("--")
+    call = [command.strip() or "compare", dashes + option] if dashes else [name]
+    assert REPLACEMENTS[name] in one_sentence(*call, status=2)
+    takers = [COMMANDS[command.strip()]] if command.strip() in COMMANDS else COMMANDS.values()
+    known = {flag for made in takers for parameter in made.params for flag in parameter.opts}
+    assert name not in COMMANDS and not (option and f"--{option}" in known)
 
 
 @pytest.mark.parametrize("line", REFUSED)
