@@ -26,28 +26,6 @@ ROUNDING = 1e-9
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_gradient_and_jacobian_by_central_differences(name: str) -> None:
-    """Along random directions, at a start point whose knees are bent."""
-    problem = load(name)
-    model = build_nlp(problem)
-    x, f, g = model.nlp["x"], model.nlp["f"], model.nlp["g"]
-    values = ca.Function("values", [x, model.nlp["p"]], [f, g])
-    slopes = ca.Function("slopes", [x, model.nlp["p"]], [ca.gradient(f, x), ca.jacobian(g, x)])
-    rng = np.random.default_rng(0)
-    w, p = model.start(problem, model.offset + 0.45 * model.scale, WIDTH), np.append(problem.p, WIDTH)
-    gradient, jacobian = (np.array(ca.DM(part)) for part in slopes(w, p))
-    for _ in range(5):
-        direction = rng.normal(size=w.size)
-        (f1, g1), (f0, g0) = (values(w + sign * DIFFERENCE_STEP * direction, p) for sign in (1, -1))
-        assert float(f1 - f0) / (2 * DIFFERENCE_STEP) == pytest.approx(
-            float(gradient.ravel() @ direction), rel=DIFFERENCE_TOLERANCE
-        )
-        got = np.array(g1 - g0).ravel() / (2 * DIFFERENCE_STEP)
-        expected = jacobian @ direction
-        np.testing.assert_allclose(got, expected, rtol=0, atol=DIFFERENCE_TOLERANCE * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("name", NAMES)
 def test_with_lifted_variables_at_their_exact_values_the_nlp_is_the_exact_problem(name: str) -> None:
     """At a reachable point, and away from the jump that single support smooths."""
     problem = load(name)

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from benchmarks.humanoids import find_plan, list_names, run, shorten, tabulate_others, tabulate_walks  # noqa: E402
+from benchmarks.humanoids import find_plan, list_names, run, tabulate_others, tabulate_walks  # noqa: E402
 
 PLAN = {"mass_kg": 5.3, "energy_J_per_m": 20.34, "speed_m_s": 0.086, "margins_m": [0.023, 0.009]}
 WALK = {"none": {"walked": 0.997, "fell_at_s": None}, "balance": {"walked": None, "fell_at_s": 2.55}}
@@ -33,25 +33,6 @@ def test_rows_say_what_was_run_and_what_was_not(tmp_path: Path) -> None:
     assert others["`nao-v6`"] == "no feasible walk: step 1: knee exceeds its limit by 1 rad"
     assert others["`mjlab:g1`"] == "refused: its knees bend in opposite directions"
     assert others["`armar:armar4`"] == "not run (time)" and len(others) == len(list_names()) - 2
-
-
-@pytest.mark.parametrize(
-    ("message", "sentence"),
-    [
-        (
-            "robot 'h1': no feet found: two links; the lowest pair, 'a' and 'b', has legs of 5 joints, which is not supported; "
-            "if other links are the feet, name them",
-            "the lowest pair, 'a' and 'b', has legs of 5 joints, which is not supported",
-        ),
-        (
-            "robot 'x': no feet found: two links; no links are mirror images; if z is not up",
-            "no links are mirror images",
-        ),
-        ("link 'a': inertia is wrong; a rigid body needs all >= 0. It moves", "link 'a': inertia is wrong"),
-    ],
-)
-def test_a_refusal_is_one_sentence(message: str, sentence: str) -> None:
-    assert shorten(message) == sentence
 
 
 def test_a_finished_robot_is_not_run_again_and_a_missing_package_is_recorded(tmp_path: Path) -> None:

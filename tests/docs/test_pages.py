@@ -14,7 +14,6 @@ from compare.study.task import list_solvers
 from docs.check import faults_of
 from docs.pages import algorithms, api, commands, playground, problems
 from docs.pages.gallery import ORDER
-from docs.pages.markdown import literal, table
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.formulation import list_problems, load
 
@@ -112,11 +111,6 @@ def test_what_was_measured_of_another_version_is_refused(tmp_path: Path) -> None
     with pytest.raises(ValueError, match="the problem has changed"):
         problems.best_section(load("walk12"), wrong)
     assert "Not measured yet" in problems.best_section(load("walk12"), None)
-
-
-def test_cells_hold_text_not_markup() -> None:
-    assert literal("a|b *c* `d|e` <f>") == r"a\|b \*c\* `d|e` \<f\>"
-    assert table(("a",), [("1",)]) == "| a |\n| --- |\n| 1 |"
 
 
 def test_the_check_of_a_site_finds_what_is_wrong(tmp_path: Path) -> None:

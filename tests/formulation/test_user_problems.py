@@ -226,14 +226,6 @@ def test_references_have_a_form() -> None:
     assert not any(map(is_reference, ("nao-ssp", "a b:leg", "own.py:")))
 
 
-def test_a_files_path_is_made_absolute_and_a_modules_name_is_not(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert user_code.parse_reference("own.py:leg", "problem") == (str(tmp_path / "own.py"), "leg")
-    assert user_code.parse_reference("some.module:leg", "problem") == ("some.module", "leg")
-
-
 def test_a_source_of_five_megabytes_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "own.py"
     path.write_bytes(b"#" * 5 * 2**20)

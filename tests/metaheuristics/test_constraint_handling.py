@@ -73,11 +73,6 @@ def test_marking_copies_and_marks_both() -> None:
     assert np.isnan(f[1]) and v[0] == 0.0
 
 
-def test_penalty_weighs_violation() -> None:
-    rule = StaticPenalty(weight=2.0).rule(0.0, np.zeros(1))
-    assert rule.order(np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.4, 0.6])).tolist() == [1, 0, 2]
-
-
 def test_epsilon_falls_to_zero_at_the_control_fraction() -> None:
     handling = EpsilonLevel(share=0.5, exponent=2.0, control=0.8)
     initial = np.array([4.0, 1.0, np.inf, 3.0, 2.0])  # finite ones sorted: 1, 2, 3, 4; a share of a half gives 3

@@ -47,12 +47,6 @@ def test_the_seed_in_the_result_repeats_the_run() -> None:
     np.testing.assert_array_equal(minimize(disc(), SWARM, evaluations=100, seed=again).x, run.x)
 
 
-def test_the_last_generation_is_cut_to_the_budget() -> None:
-    problem = disc()
-    minimize(problem, SWARM, evaluations=25)
-    assert problem.calls == [10, 10, 5]
-
-
 def test_target_needs_feasibility() -> None:
     reached = minimize(disc(), SWARM, stop=EarlyStop(target=-1.0))
     assert reached.reasons == ("target reached",) and reached.objective <= -1.0 and reached.feasible

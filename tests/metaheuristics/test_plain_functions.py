@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import dual_annealing
-from scipy.optimize import minimize as scipy_minimize
 
 from metaheuristics import Deb, ParticleSwarm, SearchError, StaticPenalty, minimize, to_algorithm
 from metaheuristics.interface import Array
@@ -70,15 +69,6 @@ def test_the_merit_it_receives_orders_points_as_the_rule_does() -> None:
     assert told == [0.5, INFEASIBLE + 3.0, INFEASIBLE + 7.0, FAILED]
     minimize(Disk(), to_algorithm(listening, "l"), evaluations=10, handling=StaticPenalty(weight=2.0))
     assert told == [0.5, 2.0 + 6.0, 4.0 + 14.0, FAILED]
-
-
-def test_a_gradient_method_of_another_library_is_a_plain_function_too() -> None:
-    def bfgs(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
-        start = np.random.default_rng(seed).uniform(lower, upper)
-        scipy_minimize(f, start, method="Nelder-Mead", options={"maxfev": evaluations})
-
-    result = minimize(Disk(), to_algorithm(bfgs, "nm"), evaluations=400, handling=StaticPenalty(weight=10.0))
-    assert result.feasible and result.objective < -1.3
 
 
 class Plain:

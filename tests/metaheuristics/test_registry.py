@@ -94,12 +94,6 @@ def test_trials_of_differential_evolution_are_those_of_scipy(strategy: str) -> N
     np.testing.assert_allclose(search.ask(), generations[1], rtol=1e-14)
 
 
-@pytest.mark.parametrize("strategy", STRATEGIES)
-def test_every_strategy_of_differential_evolution_converges(strategy: str) -> None:
-    result = minimize(sphere(2), DifferentialEvolution(strategy=strategy, population=20), evaluations=4000, seed=3)
-    assert result.objective < 1e-3
-
-
 @pytest.mark.slow
 def test_cma_restarts_with_a_growing_population() -> None:
     sizes: list[int] = []

@@ -186,7 +186,6 @@ def test_the_hessian_is_the_difference_of_gradients(name: str) -> None:
     [
         pytest.param(name, marks=[pytest.mark.slow] if name in ("humanoid-dsp", "humanoid-cycle") else [])
         for name in SMOOTH
-        if not name.startswith("nao-")  # those: test_nlp.py
     ],
 )
 def test_gradient_and_jacobian_are_differences_of_values(name: str) -> None:
@@ -206,3 +205,23 @@ def test_every_row_and_index_has_its_own_name(name: str) -> None:
         assert len(set(names)) == len(names)
     assert len(model.row_names) == len(model.row_units) == len(model.row_scales)
     assert (model.row_scales > 0.0).all()
+
+
+RICHER = [("nao-ssp", {"trajectory": "spline-2"}), ("nao-dsp", {"trajectory": "quintic"})]
+# Central differences on a hundredth of the grid's steps, relative to the largest rate; at switches of phases rates may jump.
+RATE_TOLERANCE, SMOOTH_SHARE = 1e-4, 0.95
+# Without a denser grid; and a walk of noise, which it takes many more samples to follow.
+NO_RATES = ("stairs-track", "stairs-ideal", "stairs-climb", "humanoid-walk")
+
+
+@pytest.mark.parametrize(("name", "options"), [*((name, {}) for name in PROBLEMS if name not in NO_RATES), *RICHER])
+def test_velocities_and_accelerations_are_the_derivatives_of_the_angles(name: str, options: dict[str, str]) -> None:
+    problem = load(name, **options).dense(100)
+    arrays = problem.signals(problem.start_point(np.random.default_rng(0))).arrays
+    steps = np.diff(arrays["t"])
+    within = (steps[1:] > 0.0) & (steps[:-1] > 0.0)
+    for value, rate in (("q", "qd"), ("qd", "qdd")):
+        change, largest = arrays[value][2:] - arrays[value][:-2], np.abs(arrays[rate]).max()
+        slope = change[within] / (steps[1:] + steps[:-1])[within, None]
+        error = np.abs(slope - arrays[rate][1:-1][within]).max(axis=1)
+        assert largest > 0.01 and np.quantile(error, SMOOTH_SHARE) < RATE_TOLERANCE * largest

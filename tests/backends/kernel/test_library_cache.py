@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import stat
 import subprocess
@@ -267,11 +266,3 @@ def test_a_mount_that_forbids_code_is_named_and_another_folder_used(tmp_path: Pa
     )
     assert done.returncode == 0 and not done.stdout.startswith(str(tmp_path)), done.stderr
     assert done.stderr.count("\n") == 1 and "its mount has the option noexec" in done.stderr
-
-
-def test_a_load_from_the_cache_makes_no_private_folder(
-    cache: Path, compiler: Compiler, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(library_cache, "make_private_folder", functools.cache(lambda: pytest.fail("made")))
-    for _ in range(2):
-        assert answer(compiler)[0] == 42

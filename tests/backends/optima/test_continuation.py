@@ -55,11 +55,6 @@ def test_infeasible_problems_are_named_and_the_path_continues() -> None:
     assert len(found[2].starts) == 2 * 2 + 2
 
 
-def test_one_problem_alone() -> None:
-    (solution,) = solve_both_ways(path(toy(corner), [1.5]), starts=1)
-    assert solution.converged and solution.objective == pytest.approx(1.5, abs=TOLERANCE)
-
-
 def test_nothing_is_rebuilt_along_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[object] = []
     make = ipopt.Ipopt.__init__

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import FrozenInstanceError, fields
 from typing import Any
 
 import numpy as np
@@ -237,27 +236,6 @@ def test_best_known_is_the_best_that_the_judge_accepts() -> None:
     assert find_best_known(records, POWER) == 11.0
     assert find_best_known(records, Objective(name="margin", unit="m", sense="maximise")) == 13.0
     assert math.isnan(find_best_known(records[2:3], POWER)) and math.isnan(find_best_known([], POWER))
-
-
-def test_statistics_are_frozen_and_take_keywords_only() -> None:
-    found = make_curve(record("pso", 0, [(10, 11.0)]), POWER, 10.0, Weighting())
-    test = approximate_rank_sum([1.0], [2.0])
-    for value, name in ((Weighting(), "f"), (found, "gap"), (test, "z")):
-        with pytest.raises(FrozenInstanceError):
-            setattr(value, name, 0.0)
-        with pytest.raises(TypeError):
-            type(value)(*(getattr(value, field.name) for field in fields(value)))
-    assert found != make_curve(
-        record("pso", 0, [(10, 11.0)]), POWER, 10.0, Weighting()
-    )  # by identity: arrays have no truth
-    assert not hasattr(test, "__dict__")
-
-
-def test_unequal_lengths_are_refused() -> None:
-    with pytest.raises(ValueError, match="zip"):
-        compute_running_time([1.0, 2.0], [1.0])
-    with pytest.raises(ValueError, match="zip"):
-        compute_band([np.array([1.0])], [np.array([1.0])] * 2, np.array([1.0]))
 
 
 def test_bootstrap_interval_is_a_quantile_of_the_resamples() -> None:

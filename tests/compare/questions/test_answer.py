@@ -52,10 +52,3 @@ def test_sentences_and_tables_for_people_are_printed(tmp_path: Path, capsys: pyt
     for words in ("walk: the question", "One third is enough.", "A note.", "0.33333", "wrote "):
         assert words in printed
     assert "price" not in printed
-
-
-def test_an_answer_that_cannot_be_written_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    output = write_answer(ANSWER, tmp_path / "gone")
-    assert "cannot write" in output.failures[0]
-    print_output(output, as_json=True)
-    assert json.loads(capsys.readouterr().out) == {"a_m": 1.0 / 3.0, "bound": None, "files": []}

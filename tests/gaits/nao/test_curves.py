@@ -23,8 +23,6 @@ OWN = {"nao-ssp": 9, "nao-dsp": 8}
 CURVES = {"nao-ssp": 9, "nao-dsp": 7}
 # The same sums in another order.
 ROUNDING = 1e-12
-# Central differences on a grid of 4,000 intervals.
-DIFFERENCE_TOLERANCE = 1e-5
 SOLVER = IpoptSettings(compiled=False, hessian="limited-memory")
 RICH = [order for order in SPANS if order != "cubic"]
 
@@ -56,17 +54,6 @@ def test_without_coefficients_the_motion_is_the_papers(name: str, order: str) ->
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_samples_that_suit_a_trajectory_are_among_the_options(name: str) -> None:
-    assert load(name).options["samples_per_interval"] == 1
-    rich = load(name, trajectory="quintic")
-    assert rich.options["samples_per_interval"] == 4
-    assert load(name, **rich.options).options == rich.options
-    assert load(name, samples_per_interval=4).options["samples_per_interval"] == 4
-    dense = rich.dense(5)
-    assert dense is not None and dense.options["samples_per_interval"] == 20
-
-
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("order", RICH)
 def test_coefficients_are_counted_by_curves_and_spans(name: str, order: str) -> None:
     problem = load(name, trajectory=order)
@@ -86,7 +73,7 @@ def test_each_order_contains_the_one_before(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-def test_ends_stay_and_velocities_are_derivatives(name: str) -> None:
+def test_ends_stay(name: str) -> None:
     problem = load(name, trajectory="spline-2").dense(100)
     assert problem is not None
     moved, paper = (problem.signals(padded(problem, c)).arrays for c in (some(problem), 0.0))
@@ -94,10 +81,6 @@ def test_ends_stay_and_velocities_are_derivatives(name: str) -> None:
         for signal in ("q", "qd", "hip", "left_foot", "right_foot"):
             np.testing.assert_allclose(moved[signal][row], paper[signal][row], rtol=0, atol=ROUNDING)
     assert np.abs(moved["hip"] - paper["hip"]).max() > 1e-3
-    step = moved["t"][2:, None] - moved["t"][:-2, None]
-    for value, rate in (("q", "qd"), ("qd", "qdd")):
-        found = (moved[value][2:] - moved[value][:-2]) / step
-        np.testing.assert_allclose(found, moved[rate][1:-1], rtol=0, atol=DIFFERENCE_TOLERANCE)
 
 
 @pytest.mark.slow

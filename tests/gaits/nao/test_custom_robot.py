@@ -6,12 +6,10 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import GaitError, InputError
@@ -22,7 +20,7 @@ from nlp_gait.gaits.nao.joints import LegGeometry, measure_leg
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 from tests.pinocchio_oracle import floating_model, stand
-from tests.robots.custom import HEAVIER, HIP_OFFSET, THIGH, TIBIA, Record, as_urdf, humanoid, nao, partner, written
+from tests.robots.custom import HEAVIER, HIP_OFFSET, THIGH, TIBIA, Record, humanoid, nao, written
 
 # Two double-precision algorithms on torques of some Nm.
 TORQUE_TOLERANCE_NM = 1e-10
@@ -132,18 +130,6 @@ def test_steps_may_be_longer(name: str) -> None:
 def test_steps_of_no_length_are_refused(name: str, step: Any) -> None:
     with pytest.raises(InputError, match="step_length_m must be a finite number"):
         load(name, step_length_m=step)
-
-
-@pytest.mark.slow
-def test_a_urdf_gives_the_same_problem_as_the_json(tmp_path: Path, path: str) -> None:
-    pytest.importorskip("lxml")
-    raw = humanoid()
-    (tmp_path / "robot.urdf").write_bytes(ElementTree.tostring(as_urdf(raw)))
-    written(tmp_path, partner(raw, "robot.urdf"))
-    one, other = load("nao-ssp", robot=str(tmp_path / "robot.urdf")), load("nao-ssp", robot=path)
-    x = (one.lower + one.upper) / 2
-    for a, b in zip(build_exact_model(one).at(x, one.p)[:5], build_exact_model(other).at(x, other.p)[:5], strict=True):
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-10)  # violations of some hundred
 
 
 def test_joints_that_no_gait_moves_are_locked(tmp_path: Path) -> None:

@@ -104,17 +104,6 @@ def test_torques_and_zmp_are_those_of_two_floating_halves(share: str) -> None:
 
 
 @pytest.mark.slow
-def test_velocities_and_accelerations_are_derivatives_of_the_angles() -> None:
-    problem = problem_of().dense(1000)
-    assert problem is not None
-    arrays = problem.signals(leaning(0)).arrays
-    step = (arrays["t"][2:] - arrays["t"][:-2])[:, None]
-    for value, slope in (("q", "qd"), ("qd", "qdd")):
-        differences = (arrays[value][2:] - arrays[value][:-2]) / step
-        np.testing.assert_allclose(differences, arrays[slope][1:-1], rtol=0, atol=DIFFERENCE_TOLERANCE)
-
-
-@pytest.mark.slow
 def test_the_objective_is_the_power_of_the_signals() -> None:
     check_power(problem_of(), map(leaning, range(2)))
 

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from nlp_gait.backends.exact import build_exact_model
@@ -62,24 +61,3 @@ def test_a_denser_grid_shows_the_same_gait(name: str) -> None:
     assert many["power_W"] == pytest.approx(few["power_W"], rel=0.02)
     assert many["dbm_y_min_m"] <= few["dbm_y_min_m"] + 1e-12  # the dense grid contains the coarse one
     assert many["torque_change_Nm"] >= few["torque_change_Nm"] - 1e-12  # still over a tenth of the phase
-
-
-@pytest.mark.parametrize("kind", ["analytic", "finite-difference"])
-@pytest.mark.parametrize("name", NAMES)
-def test_the_exact_functions_are_finite_where_a_motion_degenerates(name: str, kind: str) -> None:
-    """Random points: ``tests/properties/test_every_problem.py``."""
-    problem = load(name, derivatives=kind)
-    no_time = [0.31, 0, 0, 0.01, 0.01, 0, 0, 0.02, 0.0]
-    hip_joints_at_ankle_height = [0.04519 + 0.085, 0, 0, 0, 0, 0, 0, 0.02, 1.0]
-    for x in ([0.0] * 9, no_time, hip_joints_at_ankle_height, [1e6] * 9):
-        duration = x[-1:]
-        found = evaluated(problem, [*x[: len(problem.names) - 1], *duration])
-        assert np.isfinite([found.cost, found.violation, *found.g]).all()
-
-
-def test_an_unreachable_pose_says_which_leg_and_sample() -> None:
-    problem = load("nao-ssp")
-    found = evaluated(problem, [0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, 0.03, 4.0])
-    assert np.isfinite(found.cost)
-    assert found.violation > 0
-    assert any(name.startswith(("reach[left leg, ", "reach[right leg, ")) for name in found.broken)

@@ -26,17 +26,10 @@ def count_maps(problem: GaitProblem) -> int:
 @pytest.mark.parametrize(
     "options",
     [
-        {},
-        {"motors": "limits"},
         {"motors": "limits,ankle,heat,free-braking"},
-        {"objective": "torque-smoothness"},
-        {"objective": "jerk"},
         {"objective": "torque-smoothness", "motors": "limits"},
         {"objective": "jerk", "motors": "limits,ankle", "trajectory": "quintic", "samples_per_interval": 1},
     ],
-    ids=lambda options: (
-        " ".join(options.values()) if isinstance(options, dict) and "trajectory" not in options else None
-    ),
 )
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
 def test_one_call_for_a_phase(name: str, options: dict[str, Any]) -> None:

@@ -12,7 +12,6 @@ import pytest
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
-from tests.evaluation import evaluated
 from tests.pinocchio_oracle import Standing, floating_model, stand
 
 # Two double-precision algorithms on torques of up to some hundred Nm.
@@ -105,44 +104,6 @@ def test_double_support_equals_two_floating_halves_each_on_its_foot(rule: str) -
             zmp = sum(half.zmp * half.ground_load for half in halves.values()) / loads.sum()
             np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
             np.testing.assert_allclose(signals.arrays["zmp"][sample], zmp, rtol=0, atol=ZMP_TOLERANCE_M)
-
-
-@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
-def test_a_feasible_gait_puts_the_torso_where_it_is_planned(name: str) -> None:
-    problem, data = load(name), load_robot("nao-v5")
-    signals = problem.signals(np.array(FEASIBLE[name]))
-    for sample in range(11):
-        for side, foot in (("L", "left"), ("R", "right")):
-            height = np.array([0.0, 0.0, data.feet[foot].ankle_height_m])
-            ankle = signals.arrays[f"{foot}_foot"][sample] + height
-            torso = stand(floating_model(data), f"{side}AnkleRoll", ankle, *at(signals, sample), GRAVITY).torso
-            np.testing.assert_allclose(torso, signals.arrays["hip"][sample], rtol=0, atol=TORSO_TOLERANCE_M)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
-def test_velocities_and_accelerations_are_the_derivatives_of_the_angles(name: str) -> None:
-    x = np.array(FEASIBLE[name])
-    problem = load(name).dense(1000)
-    assert problem is not None
-    signals = problem.signals(x)
-    q, qd, qdd, t = (signals.arrays[key] for key in ("q", "qd", "qdd", "t"))
-    step = t[2:, None] - t[:-2, None]
-    np.testing.assert_allclose((q[2:] - q[:-2]) / step, qd[1:-1], rtol=0, atol=DIFFERENCE_TOLERANCE)
-    np.testing.assert_allclose((qd[2:] - qd[:-2]) / step, qdd[1:-1], rtol=0, atol=DIFFERENCE_TOLERANCE)
-    assert np.abs(qdd).max() > 0.1  # there is something to compare
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
-def test_power_of_the_signals_is_the_objective(name: str) -> None:
-    problem = load(name)
-    for x in motions(problem):
-        signals = problem.signals(x)
-        tau, qd, t = (signals.arrays[key] for key in ("tau", "qd", "t"))
-        power = np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t) / t[-1]
-        cost = evaluated(problem, x).cost
-        assert cost == pytest.approx(power, rel=1e-12)  # the same sums in another order
 
 
 @pytest.mark.slow

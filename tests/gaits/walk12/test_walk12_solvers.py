@@ -33,13 +33,6 @@ def test_ipopt_from_random_starts(row: tuple[float, ...]) -> None:
     assert np.median([start.iterations for start in solution.starts]) < START_ITERATIONS
 
 
-@pytest.mark.slow
-def test_between_the_plateaus() -> None:
-    solution = solve(PROBLEM.with_values(**{"lambda": 0.7}), starts=3)
-    assert solution.objective == pytest.approx(0.8686, abs=OPTIMUM_TOLERANCE)
-    assert solution.x["step_length_m"] == pytest.approx(0.0851, abs=OPTIMUM_TOLERANCE)
-
-
 @pytest.mark.parametrize("hessian", ["exact", "limited-memory"])
 def test_the_corner_is_no_trap(hessian: str) -> None:
     settings = nlp_gait.IpoptSettings(hessian=hessian)

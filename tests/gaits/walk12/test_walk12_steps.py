@@ -33,14 +33,6 @@ def test_angles_and_feet_go_on_where_steps_meet() -> None:
     assert arrays["right_ankle"][-1] == pytest.approx([1.5 * X[0], -0.12, 0.0], abs=1e-12)
 
 
-def test_rates_are_the_derivatives_of_the_angles() -> None:
-    arrays = compute_steps(load_point_mass_biped(), X, steps=1, intervals=2000, step_time_s=0.8).arrays
-    t = arrays["t"]
-    for name, rate in (("q", "qd"), ("qd", "qdd")):
-        slope = np.gradient(arrays[name], t, axis=0)[2:-2]
-        assert slope == pytest.approx(arrays[rate][2:-2], abs=2e-4 * np.abs(arrays[rate]).max())
-
-
 def test_each_step_of_a_circle_turns_by_k() -> None:
     turn, steps = np.radians(7.5), 48
     arrays = compute_steps(load_point_mass_biped(), X, steps=steps + 1, intervals=2, turn_rad=turn).arrays
