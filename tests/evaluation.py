@@ -1,7 +1,5 @@
 """A problem's exact functions at a point, read by name."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Modules of tests that need a package of another extra than ``test`` are skipped without it; the reason names the extra."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

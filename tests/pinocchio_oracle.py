@@ -4,8 +4,6 @@ The package sees the robot from the foot outwards; here the torso floats, the fo
 from the six rows of the base, which no motor drives.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

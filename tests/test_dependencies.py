@@ -1,7 +1,5 @@
 """The dependency rule: later layers import earlier ones only, by statement or by name; no cycles; importing stays cheap."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Handlers of Ctrl-C."""
 
-from __future__ import annotations
-
 import os
 import signal
 

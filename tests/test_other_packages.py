@@ -1,7 +1,5 @@
 """What reads or drives ours and is no part of the README's environment: Optuna, pygmo, ioh and iohinspector."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

@@ -1,7 +1,5 @@
 """Worker processes that cannot begin, die, or are no longer needed."""
 
-from __future__ import annotations
-
 import errno
 import os
 import time

@@ -1,7 +1,5 @@
 """Plain English in code and docs: no words of the old dialect, functions named by verbs, and one thing to a class name."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections import Counter

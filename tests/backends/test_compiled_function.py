@@ -1,7 +1,5 @@
 """Compiled functions: CasADi's numbers at each lane count, for any shapes, and one sentence for what cannot be compiled."""
 
-from __future__ import annotations
-
 import pickle
 import re
 

@@ -1,7 +1,5 @@
 """The exact function of a problem: cost, violation and rows by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from casadi import MX

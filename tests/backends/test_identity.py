@@ -1,7 +1,5 @@
 """A problem is what it evaluates to: other formulas for the same functions keep what was stored, a wrong sign does not."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The lifted NLP: its derivatives, its agreement with the exact functions, and lifting against the sense."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import casadi as ca

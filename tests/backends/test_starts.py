@@ -1,7 +1,5 @@
 """Several starts in forked processes: the same outcomes in the same order, and no process outlives them."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """Small problems with known solutions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Literal
 

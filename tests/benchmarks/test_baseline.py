@@ -1,7 +1,5 @@
 """Rows of the baseline's table have all that rankings need."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

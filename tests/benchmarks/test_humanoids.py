@@ -1,7 +1,5 @@
 """The table of humanoids, from stored files of robots that finished, were refused, or were not run."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

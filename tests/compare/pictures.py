@@ -1,7 +1,5 @@
 """Small pictures for tests, which are drawn as the real ones in a tenth of the time."""
 
-from __future__ import annotations
-
 from typing import Any, TextIO
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -1,7 +1,5 @@
 """Records made by hand, whose statistics are known."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Logs in the format of iohinspector; tests/test_other_packages.py reads them with it."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

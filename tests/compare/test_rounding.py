@@ -1,7 +1,5 @@
 """Printed points: every point of the box agrees with what is said about the box."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

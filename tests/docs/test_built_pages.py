@@ -1,7 +1,5 @@
 """What the documentation is built with: formulas become MathML, and the notebooks of the gallery run under Jupyter."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from xml.etree import ElementTree
 

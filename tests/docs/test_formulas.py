@@ -1,7 +1,5 @@
 """The pages of formulas: each equation is numbered once and can be rendered, and what refers to a number finds it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

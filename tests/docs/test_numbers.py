@@ -1,7 +1,5 @@
 """Measured numbers stand in ``docs/numbers.toml`` alone, with the command that measures them; pages include them."""
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """Generated pages: none is missing, each says what its object is, and the check of a site finds what is wrong."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import re

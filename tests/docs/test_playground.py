@@ -1,7 +1,5 @@
 """The playground in a real browser: its numbers are those of Python, sliders and searches work, and it fits all screens."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from pathlib import Path

@@ -4,8 +4,6 @@ The documentation's gallery runs all as they are, and ends at an error. Here tho
 long ones with fewer points, runs or starts.
 """
 
-from __future__ import annotations
-
 import ast
 import json
 import runpy

@@ -1,7 +1,5 @@
 """The exported NLP: built by its own build line, called from C, equal to CasADi's functions and derivatives."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

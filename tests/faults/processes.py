@@ -1,7 +1,5 @@
 """Processes and programs that the tests of faults share."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

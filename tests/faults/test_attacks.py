@@ -3,8 +3,6 @@
 An attack returns None where it is repelled, by one sentence or by no effect, else what it reached.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

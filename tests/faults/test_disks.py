@@ -1,7 +1,5 @@
 """Full disks and power cuts: what is finished is whole and flushed, and one sentence says what could not be written."""
 
-from __future__ import annotations
-
 import os
 import resource
 import sys

@@ -1,7 +1,5 @@
 """Ctrl-C in every long command: one sentence, exit status 130, and what was found until then is kept and named."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import os

@@ -1,7 +1,5 @@
 """Processes that are killed, work at the same time or cannot begin: files are whole, no run is lost, and nothing runs on."""
 
-from __future__ import annotations
-
 import itertools
 import multiprocessing
 import os

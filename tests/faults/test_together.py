@@ -1,7 +1,5 @@
 """One process or several, one thread or several: the same numbers."""
 
-from __future__ import annotations
-
 import io
 import multiprocessing
 import os

@@ -1,7 +1,5 @@
 """Derived problems: new functions, and everything else that a problem provides still works."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Every problem: parameters, bounds, fixed variables, names and messages."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Display of results: one line in a terminal, a small table in a notebook, data frames, and the balance margin."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A problem records its options, and loading it with them gives the same problem."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Mapping
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """A problem in other processes: it is pickled as its maker, options and values, and refused if these have changed."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Time histories describe all their columns, or they are refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """User-defined problems by name; mistakes in them are reported when they are made, with the name of the row."""
 
-from __future__ import annotations
-
 import json
 import pickle
 from dataclasses import replace

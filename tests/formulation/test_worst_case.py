@@ -1,7 +1,5 @@
 """One motion for several scenarios."""
 
-from __future__ import annotations
-
 import pytest
 from casadi import MX
 

@@ -1,7 +1,5 @@
 """Damaged files and command lines, most of which once did harm, are refused in one sentence, or accepted for what they say."""
 
-from __future__ import annotations
-
 import copy
 import json
 import os

@@ -1,7 +1,5 @@
 """Every adapter with the real package: the same values, bounds and best point, and an optimiser of that package on it."""
 
-from __future__ import annotations
-
 import pickle
 import sys
 import warnings

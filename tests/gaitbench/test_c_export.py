@@ -1,7 +1,5 @@
 """The exported C++: built by its own build line, called from C and from Octave, equal to the package to 1e-12."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import shutil

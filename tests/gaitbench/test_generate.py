@@ -1,7 +1,5 @@
 """Instances by seed: the same numbers everywhere, the same problem in other variables, and optima anywhere in the box."""
 
-from __future__ import annotations
-
 import hashlib
 import pickle
 from datetime import date

@@ -1,7 +1,5 @@
 """Every instance is what it was when it was published, and one object serves threads, processes and derivatives."""
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import pickle

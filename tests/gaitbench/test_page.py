@@ -1,7 +1,5 @@
 """What the page on GaitBench says, runs."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Callable

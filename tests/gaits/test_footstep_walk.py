@@ -1,7 +1,5 @@
 """Walks along footholds: continuous through turns, exact against the engine's kinematics, judged by rotated soles."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

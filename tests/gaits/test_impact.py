@@ -1,7 +1,5 @@
 """Inelastic touch-down of a cycle: energy and momentum before and after against Pinocchio, and a soft landing loses nothing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

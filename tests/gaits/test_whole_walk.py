@@ -1,7 +1,5 @@
 """Whole walks: continuous from standing to standing, judged by their phases' limits, named where infeasible."""
 
-from __future__ import annotations
-
 import json
 from importlib.resources import files
 from pathlib import Path

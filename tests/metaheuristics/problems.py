@@ -1,7 +1,5 @@
 """Small objectives with known optima, for the tests of `metaheuristics`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Constraint rules are total preorders, and each prefers what its definition says."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """The suite that every search algorithm passes; a new one only joins the list below."""
 
-from __future__ import annotations
-
 import dataclasses
 import pickle
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Programs that take part by lines of JSON: what they receive, how they end, and every way in which they fail."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

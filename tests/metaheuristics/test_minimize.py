@@ -1,7 +1,5 @@
 """The loop: budget, pairing, stopping, interruption, checks of arguments and answers."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

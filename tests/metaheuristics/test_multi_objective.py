@@ -1,7 +1,5 @@
 """Several objectives at once: a problem whose front is known, equal seeds, budgets, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

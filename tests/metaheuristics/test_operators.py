@@ -1,7 +1,5 @@
 """Formulas of the algorithms against cases computed by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

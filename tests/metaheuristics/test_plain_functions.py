@@ -1,7 +1,5 @@
 """Plain functions and user-defined objects as algorithms: counted, stopped and judged as all others."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Algorithms of other packages, differential evolution and L-SHADE."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import warnings

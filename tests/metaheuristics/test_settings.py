@@ -1,7 +1,5 @@
 """Settings and the registry: what is refused, and how it is said."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Random gaits and boxes against what is proven of them: no proof may contradict a feasible point or a fine grid of samples."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

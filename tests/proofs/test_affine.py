@@ -1,7 +1,5 @@
 """Affine arithmetic encloses every value: single operations against exact ones, problems at sampled points."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import Any

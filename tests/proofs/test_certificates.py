@@ -1,7 +1,5 @@
 """Proofs keep feasible points, continue after they were killed, and can be checked; a wrong proof is never closed."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Checkpoints of proofs: a killed proof continues, another prover starts again, and what is damaged or forged is one sentence."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """Forged certificates are refused, each with its reason: changed numbers, worse incumbents, false bounds, other problems."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import asdict, replace

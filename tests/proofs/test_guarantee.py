@@ -1,7 +1,5 @@
 """What is proven between samples: true where a fine grid is, with the violation's bounds where it is not."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Forms of degree two enclose gaits at sampled points, and bounds from them keep feasible points (see also ``test_affine``)."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

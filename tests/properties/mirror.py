@@ -1,7 +1,5 @@
 """A robot's image in the plane between left and right."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from nlp_gait.robots import Foot, Joint, Link, Robot, load_robot

@@ -1,7 +1,5 @@
 """Arguments of another kind: one typed error that names the argument, never Python's own from deep inside."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What holds for every problem: total exact functions, a violation that means what it says, and an NLP that agrees."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Invariances that any correct model of a walking robot has, whatever its numbers."""
 
-from __future__ import annotations
-
 import copy
 import math
 from functools import cache

@@ -4,8 +4,6 @@ No algorithm of rigid-body dynamics is used: where every link is, is a Taylor se
 series' derivatives; and the torque of a joint is the moment that the rate of the momentum of all that it carries asks for.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 Origin: the ankle of the stance foot. Angles of legs and feet turn clockwise from the forward axis, the torso's against it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 

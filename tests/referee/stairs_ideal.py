@@ -1,7 +1,5 @@
 """Trajectory optimisation of a step for many x at once: quantised dynamics (44), (45), and the loads of every interval."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

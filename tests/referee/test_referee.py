@@ -4,8 +4,6 @@ What a paper does not define (a pose out of reach, the centre of pressure under 
 number of points says how much that is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

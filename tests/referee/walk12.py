@@ -1,7 +1,5 @@
 """The 12-joint walk of Goswami, Vadakkepat, Phung (2008) for many x at once: point masses by exact forward kinematics."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

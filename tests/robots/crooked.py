@@ -1,7 +1,5 @@
 """A robot of our own as a URDF: an offset in every joint of its legs, an arm, and the oddities that real files have."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 # Origins [m] and axes of the left leg; the right one is its mirror image. No two axes of hip or ankle cross.

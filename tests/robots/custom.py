@@ -1,7 +1,5 @@
 """Robot files of a user: a humanoid that is not NAO, as JSON and as URDF."""
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Inertia tensors about the wrong point are found and explained, and those of the real robots pass."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Robots from a URDF alone: inferred feet, soles, forward and sides; warnings and errors."""
 
-from __future__ import annotations
-
 import json
 import logging
 import re

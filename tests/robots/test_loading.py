@@ -1,7 +1,5 @@
 """Robot files: the three NAOs, and a message for everything that can be wrong."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from collections.abc import Callable

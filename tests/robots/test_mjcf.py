@@ -1,7 +1,5 @@
 """Robots from MJCF: MuJoCo's own translation of a URDF is the same robot, and a message for what cannot be read."""
 
-from __future__ import annotations
-
 import re
 import sys
 from contextlib import nullcontext

@@ -1,7 +1,5 @@
 """Robots with other masses, lengths and soles."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

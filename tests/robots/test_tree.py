@@ -1,7 +1,5 @@
 """Links as seen from any of them, locked joints, and point masses; Pinocchio is the witness."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

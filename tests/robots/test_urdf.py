@@ -1,7 +1,5 @@
 """Robots from URDF files: the same robot as from JSON in any frames, and a message for each fault."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

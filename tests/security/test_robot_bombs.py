@@ -1,7 +1,5 @@
 """Small robot files that ask for endless time or memory are rejected in one sentence, within the limits."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

@@ -1,7 +1,5 @@
 """A user's own words on the terminal, in reports and in figures: shown, never obeyed."""
 
-from __future__ import annotations
-
 import io
 import re
 from dataclasses import replace

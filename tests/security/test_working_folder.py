@@ -1,7 +1,5 @@
 """Python files in the working folder never run, whatever module they are called after."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Files that are written: by this process alone, under their own name, through no link."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import io

@@ -1,7 +1,5 @@
 """The engine's own inverse dynamics of a planned motion: an oracle for the model's torques."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from xml.etree import ElementTree as Xml
 

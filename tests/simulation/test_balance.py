@@ -1,7 +1,5 @@
 """Balance of the whole body: footholds in closed form, torques against the engine, and walks that open loop does not survive."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

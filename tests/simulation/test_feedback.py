@@ -1,7 +1,5 @@
 """Balance feedback: what it adds, that it helps, and that its sensors count."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Robots without a NAO's data in the engine's terms: same torques, same pressure, what touches what."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as Xml
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The climb, in the engine."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

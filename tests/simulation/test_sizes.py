@@ -1,7 +1,5 @@
 """Sizes that are allowed one by one but whose product is too large: refused by name before memory or time is spent."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Walks of several steps: mirrored exactly, and in the engine."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

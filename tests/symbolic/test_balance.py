@@ -1,7 +1,5 @@
 """The zero-moment point by hand: forces and moments small enough to check on paper."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from casadi import DM, SX

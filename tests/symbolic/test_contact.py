@@ -1,7 +1,5 @@
 """Contacts: what is dropped comes to rest, what slides is slowed by mu m g, nothing blows up."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Regrouped inertias and saved operations of the recursion, whose torques tests/gaits and tests/simulation check."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

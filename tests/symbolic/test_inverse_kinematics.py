@@ -1,7 +1,5 @@
 """Closed-form leg angles: inverse of the forward kinematics, right derivatives, finite everywhere."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

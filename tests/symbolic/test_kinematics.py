@@ -1,7 +1,5 @@
 """Forward kinematics by hand, on a leg of two links."""
 
-from __future__ import annotations
-
 import math
 
 import casadi as ca

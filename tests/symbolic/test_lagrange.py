@@ -1,7 +1,5 @@
 """Equations of motion of the nine-link biped: structure, by hand, and an independent oracle."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

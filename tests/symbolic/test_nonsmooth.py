@@ -1,7 +1,5 @@
 """The Exact and the Lifted interpretation of what is not smooth."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """One quantum of time against the same balance of forces in NumPy."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

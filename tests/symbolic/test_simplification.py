@@ -1,7 +1,5 @@
 """Rewritten expressions: the same values, fewer of the dear operations."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Splines against SciPy, and what they leave alone."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

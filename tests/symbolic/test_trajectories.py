@@ -1,7 +1,5 @@
 """Boundary conditions and derivatives of the trajectories."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Compiled functions and derivatives of an NLP: CasADi's values, and the same path of a solver."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The compiled objective: the virtual machine's numbers at every lane count, whatever the batch, the threads or the memory."""
 
-from __future__ import annotations
-
 import functools
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A compiler that fails, hangs, writes rubbish or computes wrong: the virtual machine takes over, and one line says so."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

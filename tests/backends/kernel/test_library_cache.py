@@ -1,7 +1,5 @@
 """The cache of compiled code: broken, not writable, shared, or written to by another user."""
 
-from __future__ import annotations
-
 import os
 import stat
 import subprocess

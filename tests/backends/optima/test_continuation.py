@@ -1,7 +1,5 @@
 """Paths of neighbouring problems."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from casadi import MX

@@ -1,7 +1,5 @@
 """Derivatives of optima: by hand, by solving again, and by CasADi's own."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import casadi as ca

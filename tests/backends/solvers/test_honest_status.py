@@ -1,7 +1,5 @@
 """What IPOPT does silently is said: acceptable level, no convergence, NaN, a linear solver, and options from elsewhere."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Solutions by IPOPT: feasible by the exact functions, with true prices, and honest when there is none."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict, replace
 

@@ -1,7 +1,5 @@
 """Every NLP solver of the registry, and one that is not in it, wherever a solver is taken."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A run that exceeds its time limit ends there, says so and keeps its point; a solver that cannot heed a limit is refused one."""
 
-from __future__ import annotations
-
 import time
 
 import casadi as ca

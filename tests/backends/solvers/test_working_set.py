@@ -1,7 +1,5 @@
 """IPOPT on the rows that matter: it ends where IPOPT on all rows does, and every row holds there."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Runs that fail in a comparison: said on stderr, with the reason in the table, and status 1 where a solver has no run left."""
 
-from __future__ import annotations
-
 import json
 import os
 import shlex

@@ -1,7 +1,5 @@
 """The answer of a study: gaps from the shipped best known value of exactly this problem, what is proven, what chance may be."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Ranks over problems, Friedman's test and the critical difference as computed by hand; wins, and the stars of the best."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

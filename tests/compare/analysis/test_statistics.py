@@ -1,7 +1,5 @@
 """Statistics against numbers worked out by hand, and against SciPy's where it has them."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Differences below the judge's tolerance are ties, and gaps from an optimum near zero are absolute."""
 
-from __future__ import annotations
-
 import math
 import random
 import re

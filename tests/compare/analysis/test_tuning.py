@@ -1,7 +1,5 @@
 """Tuning of searches, without Optuna's part of it, which tests/test_other_packages.py runs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

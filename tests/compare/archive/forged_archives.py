@@ -1,7 +1,5 @@
 """Damaged and forged archives of a study, each made from the files of an honest one."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

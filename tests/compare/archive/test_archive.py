@@ -1,7 +1,5 @@
 """An archive holds on any machine, its runs can be repeated, and every damage and forgery is named."""
 
-from __future__ import annotations
-
 import json
 import re
 import zipfile

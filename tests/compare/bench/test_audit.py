@@ -1,7 +1,5 @@
 """The audit finds planted biases and accuses no unbiased search."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

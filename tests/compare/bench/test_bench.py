@@ -1,7 +1,5 @@
 """The leaderboard: places follow from expected running times, and a new algorithm gets its own."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import product

@@ -1,7 +1,5 @@
 """The command line called by tests: in this process, or in one of its own where it is the process that is tested."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

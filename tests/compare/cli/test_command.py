@@ -1,7 +1,5 @@
 """How groups of options become the options of a command."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

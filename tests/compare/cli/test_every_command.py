@@ -1,7 +1,5 @@
 """What every command keeps: help with an example, texts and limits of its options, and one sentence for what it refuses."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``bench``, and ``export`` of problems as users call them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The file that `nlp-gait list` prints has the names of today, and listing imports nothing that takes time."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Files and outputs of commands: inputs and files of other programs stay, and what cannot be written is one sentence."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """A program as a solver of a study: by its command, with its files' hash, resumed and archived only where it is named."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`pareto`, `certainty` and `solve` as scripts use them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

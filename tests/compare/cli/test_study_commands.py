@@ -1,7 +1,5 @@
 """`compare` and `report` as scripts use them."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import sys

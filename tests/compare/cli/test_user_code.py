@@ -1,7 +1,5 @@
 """User code: a problem, a search and a plain function in one file, in every command by ``file.py:name``."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

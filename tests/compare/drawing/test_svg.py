@@ -1,7 +1,5 @@
 """Charts as SVG: well-formed, within the picture, every point drawn, and one look per solver over a study."""
 
-from __future__ import annotations
-
 import re
 from xml.etree import ElementTree
 

@@ -1,7 +1,5 @@
 """Runs of a reproduction: start points, the best of several, and what becomes of a run that fails."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

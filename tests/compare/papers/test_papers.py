@@ -1,7 +1,5 @@
 """What every paper has to keep: rows that are decided, a page in order, and a record that a quick run confirms."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from functools import cache

@@ -1,7 +1,5 @@
 """Rules that decide about claims, and tables that bind them to functions."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

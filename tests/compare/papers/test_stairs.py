@@ -1,7 +1,5 @@
 """The stairs paper's equations as printed, computed by hand; what the engine makes of a plan, in words."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

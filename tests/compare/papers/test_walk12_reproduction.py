@@ -1,7 +1,5 @@
 """Rules and data of the 12-joint walk's paper."""
 
-from __future__ import annotations
-
 import pytest
 
 from compare.papers.walk12.walk12 import (

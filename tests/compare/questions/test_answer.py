@@ -1,7 +1,5 @@
 """What every question hands out: a page, tables, data, and what is printed of it."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The question ``capabilities`` on a walk of two numbers whose maxima are known in closed form."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

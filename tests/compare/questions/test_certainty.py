@@ -1,7 +1,5 @@
 """Certainty: proofs for problems whose optimum is known, clusters, estimates with known answers, and resumption."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from casadi import MX

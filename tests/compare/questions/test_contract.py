@@ -1,7 +1,5 @@
 """What every question keeps: files that agree, a rerun that repeats no step, an interrupt that loses none."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

@@ -1,7 +1,5 @@
 """Fronts: knees of made-up fronts by hand, the criteria against the judge, a small front of NAO, and searches."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Prices of limits and of errors in the robot's data, as command and as function."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

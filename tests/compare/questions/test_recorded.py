@@ -1,7 +1,5 @@
 """A gait from elsewhere next to the optimum of its step and duration, and in the engine."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Steps of questions in the store: runs of solvers with every bit, in forks, stopped, and of a changed robot."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import fields, replace

@@ -1,7 +1,5 @@
 """Robust optima, and boxes of robots."""
 
-from __future__ import annotations
-
 import pytest
 
 from compare.questions.question import Work

@@ -1,7 +1,5 @@
 """Sweeps: axes, true curves, tables and pictures."""
 
-from __future__ import annotations
-
 import csv
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Sweeps of walking cycles: cost of transport, results that can be simulated, and the engine."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Documents: what stands where on the page, in Markdown and in the files beside it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from compare.drawing.figures import make_figure

@@ -1,7 +1,5 @@
 """The report shows the gaits themselves, or says why it does not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

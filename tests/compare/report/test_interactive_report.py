@@ -1,7 +1,5 @@
 """The report in a real browser: charts answer to hover, zoom and choices, gaits move, all by keyboard, on two screens."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import replace

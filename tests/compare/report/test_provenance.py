@@ -1,7 +1,5 @@
 """A report says which settings were changed, and from which default."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

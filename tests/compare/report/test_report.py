@@ -1,7 +1,5 @@
 """A report from records made by hand: every number in it is known."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Files for papers and other programs: their numbers are those of the runs, and LaTeX and pyarrow read them."""
 
-from __future__ import annotations
-
 import csv
 import re
 import subprocess

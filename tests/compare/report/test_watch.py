@@ -1,7 +1,5 @@
 """A watched report follows the records, and its page reloads itself until the watch ends."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What to cite: one source of truth, and every problem leads to its papers."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A study on a real Dask cluster on loopback: user code reaches its workers, and a killed worker or scheduler loses no run."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

@@ -1,7 +1,5 @@
 """No forged record influences a report: each is excluded by name, and the numbers are those of the honest records."""
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Callable, Iterator

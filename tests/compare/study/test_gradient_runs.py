@@ -1,7 +1,5 @@
 """Gradient methods as runs: SLSQP on finite differences, other NLP solvers, limits."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A study grows in its folder: a run's file is named after its inputs; ``study.json`` lists those that belong to it."""
 
-from __future__ import annotations
-
 import json
 import linecache
 import sys

@@ -1,7 +1,5 @@
 """Results from elsewhere: judged like everything else, unknown times left out of what needs them."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

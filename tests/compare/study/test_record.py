@@ -1,7 +1,5 @@
 """Whatever is written of a run can be read: anything that a run may return becomes a record, if need be that of a failed run."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

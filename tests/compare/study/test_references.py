@@ -1,7 +1,5 @@
 """Shipped best known values: each is found by its problem, follows from its point, and has the bound of its certificate."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import asdict
 

@@ -1,7 +1,5 @@
 """User code runs in its own process: what comes back, what its record says otherwise, and what is left behind."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

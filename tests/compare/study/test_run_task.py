@@ -1,7 +1,5 @@
 """User-defined algorithms that fail in every way: each has a record of its failure, and the others' records are complete."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Results that are stored and loaded again."""
 
-from __future__ import annotations
-
 import json
 import math
 from functools import partial

@@ -1,7 +1,5 @@
 """Gaits of a robot with offsets in every joint of its legs: against Pinocchio, in both interpretations, and simulated."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

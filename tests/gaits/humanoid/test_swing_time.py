@@ -1,7 +1,5 @@
 """Bounds on times and velocities from the joints that swing a robot's legs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

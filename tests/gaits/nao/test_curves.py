@@ -1,7 +1,5 @@
 """Richer motions of the NAO phases: what they contain, what they keep, what limits them, and what they save."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A humanoid that is not NAO: solved without a change of code, and a message for legs that the closed form does not fit."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

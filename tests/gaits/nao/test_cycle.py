@@ -1,7 +1,5 @@
 """The walking cycle: continuous over both switches, periodic after mirroring, with the loads of the published phases."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

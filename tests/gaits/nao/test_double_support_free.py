@@ -1,7 +1,5 @@
 """Double support with a leaning torso against Pinocchio, and what it shares with planned motions."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

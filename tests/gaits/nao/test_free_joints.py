@@ -1,7 +1,5 @@
 """Single support with free joints against Pinocchio, and what it shares with planned motions."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

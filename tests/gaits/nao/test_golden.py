@@ -1,7 +1,5 @@
 """The NAO problems against numbers computed elsewhere, and what their options change."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

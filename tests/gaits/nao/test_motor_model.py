@@ -1,7 +1,5 @@
 """Formulas of real motors at artificial samples, against NumPy: their power, their limits, joints that share one."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Real motors in the NAO problems, against numbers by hand from the time histories."""
 
-from __future__ import annotations
-
 import json
 import math
 from importlib import resources

@@ -1,7 +1,5 @@
 """Motions from elsewhere: judged as planned ones are, mirrored if need be, against Pinocchio and against our own optima."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A phase is evaluated once at its samples, whatever its limits read: the exact function maps one function for each phase."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

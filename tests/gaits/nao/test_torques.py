@@ -1,7 +1,5 @@
 """Torques, ZMP and centre of mass of the NAO problems against Pinocchio."""
 
-from __future__ import annotations
-
 import json
 from importlib import resources
 from pathlib import Path

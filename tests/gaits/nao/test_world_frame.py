@@ -1,7 +1,5 @@
 """Dynamics in the world frame: the recursion's torques and wrench for any motion."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The climb of several stairs: its steps, places and joints; ``tests.simulation`` solves and simulates it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

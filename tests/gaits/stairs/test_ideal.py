@@ -1,7 +1,5 @@
 """The ideal step: known optima; its rows are those of ``tests.referee``."""
 
-from __future__ import annotations
-
 import pytest
 
 import nlp_gait

@@ -1,7 +1,5 @@
 """The paper's network learns every pose of a step; at the printed rate it does not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """The planner: feasible on a dense grid, never beaten by a search, and clear about what forbids a stair."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

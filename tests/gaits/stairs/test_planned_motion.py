@@ -1,7 +1,5 @@
 """The hip of the planned step, also where the step is faster than any of the paper's; the rest is in ``tests.referee``."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

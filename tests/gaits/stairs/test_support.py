@@ -1,7 +1,5 @@
 """Balance with the load on both feet: against ``compute_loads`` on a flat stance foot, and by the mechanical energy."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The closed loop: finite at every gain, honest about standing still, and one optimum for search and multiple shooting."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The 12-joint walk: model, objective, constraints and options."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

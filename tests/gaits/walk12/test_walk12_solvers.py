@@ -1,7 +1,5 @@
 """Solvers on the 12-joint walk: IPOPT's optimum from any start, the paper's GA near it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

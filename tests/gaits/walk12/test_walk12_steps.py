@@ -1,7 +1,5 @@
 """Walking on with 12 joints: the exchange of legs, straight and in a circle."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

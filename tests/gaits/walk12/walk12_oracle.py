@@ -1,7 +1,5 @@
 """The 12-joint walk in plain NumPy, straight from the paper's print: written apart from the package, to check it."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
