@@ -29,7 +29,7 @@ from nlp_gait.user_code import Kind, hash_source, is_user_code, list_source_file
 
 README, LOCK = "README.md", "requirements.txt"
 # Files of a study's folder next to its records; everything else in it stays out of the archive.
-PARTS = (FILE, "*.html", "*.md", "*.png", "*.svg", "*.csv", "better-*.json", "store/simulations/**/*")
+PARTS = (FILE, "*.html", "*.md", "*.png", "*.svg", "*.csv", "*.tex", "*.pdf", "better-*.json", "store/simulations/**/*")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # time of all entries, so that equal studies give equal archives
 
 
@@ -131,6 +131,7 @@ def _collect_certificates(records: Sequence[RunRecord], content: dict[str, bytes
 
 def _list_packages() -> list[str]:
     names = {d.metadata["Name"]: d.version for d in distributions() if d.metadata["Name"]}
+    names.pop("nlp-gait", None)  # it comes from a clone
     return sorted((f"{name}=={number}" for name, number in names.items()), key=str.lower)
 
 
@@ -144,4 +145,5 @@ def _make_readme(records: Sequence[RunRecord], manifest: Manifest, content: Iter
     template = files("compare.archive").joinpath("readme.md").read_text(encoding="utf-8")
     problems, solvers = (sorted({getattr(r, key) for r in records}) for key in ("problem", "solver"))
     title = f"{len(records)} runs of {', '.join(solvers)} on {', '.join(problems)}"
-    return template.format(title=title, version=version("nlp-gait"), commands=commands, code=code)
+    facts = {"version": version("nlp-gait"), "sha": hash_installed_code()[:8]}
+    return template.format(title=title, commands=commands, code=code, **facts)

@@ -41,7 +41,7 @@ class Variable:
     unit: str
     lower: float
     upper: float
-    description: str
+    description: str = ""
     minimum: float = -math.inf
     maximum: float = math.inf
 
@@ -145,7 +145,7 @@ class Constraint:
     #: One per row, naming joint or side and sample; empty for a single row without a label
     labels: tuple[str, ...] = ()
     unit: str  #: of value and bounds
-    scale: float  #: violation of this size counts as 1 in the total violation [unit]
+    scale: float = 1.0  #: violation of this size counts as 1 in the total violation [unit]
     value: MX  #: (m, 1)
     #: (m, 1) or scalar, a function of parameters only; a number stands for ``MX(number)``
     lower: MX | None = None
