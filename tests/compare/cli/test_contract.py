@@ -83,3 +83,11 @@ def test_unreachable_pose_is_evaluated_and_named():
     ]
     assert "reach[left leg, 5]" in out_of_reach
     assert "reach[left leg, " in nlp_gait("evaluate", "nao-ssp", "--x", x).stdout
+
+
+def test_solve_takes_any_nlp_solver_by_name(tmp_path):
+    out = tmp_path / "best.json"
+    shown = nlp_gait("solve", "walk12", "--starts", "1", "--solver", "slsqp", "--out", out).stdout
+    written = json.loads(out.read_text())
+    assert "; slsqp\n" in shown and written["solver"] == "slsqp" and written["linear_solver"] == ""
+    assert written["claimed"] and written["active_constraints"] == []

@@ -1,5 +1,8 @@
 """Certainty: proofs for problems whose optimum is known, clusters, estimates with known answers, and resumption."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 from casadi import MX
@@ -15,6 +18,7 @@ from nlp_gait.formulation import Constraint
 from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
+from tests.compare.cli import calls
 
 
 def two_valleys(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
@@ -93,3 +97,14 @@ def test_evidence_is_proven_or_supported() -> None:
     assert evidence.certificate is not None and evidence.certificate.closed
     assert "no feasible x falls below" in evidence.proven
     assert evidence.search is not None and evidence.search.gap == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_certificate_without_time_for_a_finite_bound_says_so(tmp_path: Path) -> None:
+    line = "certainty walk12 --starts 4 --evaluations 0 --time-limit 1e-9"
+    done = calls.nlp_gait(*line.split(), "--out", tmp_path)
+    assert "Proven: nothing: the time limit was reached before a finite bound" in done.stdout
+    data = json.loads((tmp_path / "walk12-certainty.json").read_text())
+    assert data["certificate"]["bound"] is None and data["certificate"]["closed"] is False
+    page = (tmp_path / "walk12-certainty.md").read_text()
+    assert "Best known value: 0.970835 (shipped, proven to six digits)" in page
+    assert "{Goswami2008," in page.split("How to cite")[1]

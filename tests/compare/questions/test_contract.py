@@ -25,6 +25,7 @@ from compare.study.store import Store
 from nlp_gait import load
 from nlp_gait.files import replace_nan
 from nlp_gait.formulation import GaitProblem
+from tests.compare.cli.calls import as_json, nlp_gait
 from tests.compare.questions.test_capabilities import make_walk
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
@@ -43,17 +44,23 @@ def list_sweep(**options: Any) -> Sweep:
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A small question, and the name in its answer of the list of the rows of its CSV file; empty without one."""
+    """A small question, the command that asks it, and the name in its answer of the rows of its CSV file; both may be empty."""
 
     make: Callable[[], Question[Any]]
     rows: str = ""
+    line: str = ""
 
 
 CASES = {
-    "sweep": Case(make=lambda: list_sweep(axes=[parse_axis("step_length_m=0.08,0.1")]), rows="points"),
+    "sweep": Case(
+        make=lambda: list_sweep(axes=[parse_axis("step_length_m=0.08,0.1")]),
+        rows="points",
+        line="sweep walk12 --over step_length_m=0.08,0.1 --starts 1",
+    ),
     "search": Case(
         make=lambda: list_sweep(axes=[parse_axis("foot_lift_m=0.01,0.03")], algorithm="random", evaluations=200),
         rows="points",
+        line="sweep walk12 --over foot_lift_m=0.01,0.03 --starts 1 --algorithm random --evaluations 200",
     ),
     "variants": Case(
         make=lambda: Variants(
@@ -62,9 +69,15 @@ CASES = {
             variants=[Variant(name="as given"), Variant(name="limits", options={"motors": "limits"})],
         ),
         rows="variants",
+        line="variants nao-ssp --set intervals=2 --starts 1 --variant limits:motors=limits",
     ),
-    "certainty": Case(make=lambda: Certainty(problem=load("walk12"), starts=4, evaluations=300, time_limit_s=0.0)),
-    "prices": Case(make=lambda: Prices(problem=load("walk12"), starts=2), rows="limits"),
+    "certainty": Case(
+        make=lambda: Certainty(problem=load("walk12"), starts=4, evaluations=300, time_limit_s=0.0),
+        line="certainty walk12 --starts 4 --evaluations 300 --time-limit 0",
+    ),
+    "prices": Case(
+        make=lambda: Prices(problem=load("walk12"), starts=2), rows="limits", line="prices walk12 --starts 2"
+    ),
     "capabilities": Case(make=lambda: Capabilities(problem=make_walk(), starts=1)),
     "pareto": Case(
         make=lambda: Pareto(
@@ -75,6 +88,8 @@ CASES = {
             runs=1,
         ),
         rows="front",
+        line="pareto nao-ssp --set intervals=4 --points 5 --starts 1 --search NSGA2=100 --runs 1 "
+        + " ".join(f"--set {name}={value}" for name, value in ARM.items()),
     ),
     "robust": Case(make=lambda: Robust(problem=load_small(), mass=0.0, starts=1, samples=1), rows="boxes"),
 }
@@ -133,6 +148,16 @@ def test_an_interrupted_question_continues_to_the_same_answer(
     assert without_times(replace_nan(resumed.data)) == without_times(replace_nan(whole.data))
     assert {path.name for path in (tmp_path / "store").iterdir()} == steps
     assert {path: path.stat().st_mtime_ns for path in half} == half  # none is computed again
+
+
+@pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.line])
+def test_its_command_prints_the_answer(name: str, folder: Path) -> None:
+    printed = as_json(*CASES[name].line.split(), "--out", folder / name)
+    assert all(Path(file).stat().st_size > 0 for file in printed["files"])
+    assert without_times(printed) == without_times(
+        json.loads(json.dumps(replace_nan(answer(name, Store(folder / name)).data)))
+    )
+    assert "wrote " in nlp_gait(*CASES[name].line.split(), "--out", folder / name).stdout
 
 
 @each_question

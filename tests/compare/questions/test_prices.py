@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from compare.cli import app
 from compare.questions.prices import AGREEMENT, Prices
 from compare.questions.question import Work, find
 from compare.study.store import Store
@@ -21,12 +20,6 @@ RUN = CliRunner()
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the stored solves of the question that the tests have in common."""
     return tmp_path_factory.mktemp("prices")
-
-
-def test_the_command_says_units_and_steps(folder: Path) -> None:
-    done = RUN.invoke(app, ["prices", "walk12", "--starts", "2", "--out", str(folder)])
-    assert done.exit_code == 0, done.output
-    assert "step_length_m.upper" in done.stdout and "1 mm" in done.stdout and "1 degree" in done.stdout
 
 
 def test_slopes_agree_with_solving_again_where_it_can_be_done(folder: Path) -> None:

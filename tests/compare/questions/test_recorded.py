@@ -14,7 +14,7 @@ from nlp_gait.formulation import Result
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.nao.recorded import make_recorded_gait
 from nlp_gait.robots import load_robot
-from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
+from tests.compare.cli.calls import as_json, nlp_gait
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
@@ -47,22 +47,6 @@ def test_tighter_limits_are_named(gait: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(module, "_solve_optimum", lambda *_: None)
     shown = nlp_gait("evaluate", "--motion", gait, "--no-engine", "--set", "torque_change_limit_Nm=0.01").stdout
     assert "Infeasible on the samples" in shown and "torque_change[" in shown and "In the engine" not in shown
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["evaluate", "nao-ssp"], "give a point with --x, or a motion with --motion"),
-        (
-            ["evaluate", "--x", "1,2"],
-            "name the problem, for example nao-ssp; it may be left out only where a file names it",
-        ),
-        (["evaluate", "--motion", "{gait}", "--set", "a=1"], "unknown parameter of recorded-ssp 'a'"),
-        (["evaluate", "nao-dsp", "--motion", "none.csv"], "cannot be read"),
-    ],
-)
-def test_wrong_use_is_one_sentence(arguments: list[str], words: str, gait: Path) -> None:
-    assert words in one_sentence(*(a.replace("{gait}", str(gait)) for a in arguments))
 
 
 def test_missing_results_are_explained(gait: Path, monkeypatch: pytest.MonkeyPatch) -> None:
