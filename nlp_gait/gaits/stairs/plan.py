@@ -11,7 +11,15 @@ from casadi import DM, MX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Assembly, Constraint, Display, GaitProblem, Grid, Signals, SolverHints, maker
-from nlp_gait.formulation.assembly import NumericPoint, Objective, Point, RowsOverTime, Variable, make_parameters
+from nlp_gait.formulation.assembly import (
+    NumericPoint,
+    Objective,
+    Point,
+    Quadrature,
+    RowsOverTime,
+    Variable,
+    make_parameters,
+)
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import (
     StepMotion,
@@ -83,6 +91,7 @@ def stairs_plan(
     angle_limits: bool = True,
     shanks: Shanks = "free",
     intervals: int = 40,
+    rule: Quadrature = "trapezoid",
 ) -> GaitProblem:
     """Return the planner of one step.
 
@@ -94,6 +103,7 @@ def stairs_plan(
         angle_limits: whether angles of links and knees are limited; the paper gives no limits.
         shanks: free, as printed, or limited: both shanks stay outside the steps.
         intervals: of the step, a quarter in each phase.
+        rule: of the energy's integral over each phase, trapezoid or simpson.
 
     Source:
         Bhardwaj et al., section V and Table III.
@@ -101,7 +111,7 @@ def stairs_plan(
     if intervals < len(PHASES) or intervals % len(PHASES):
         raise InputError(f"intervals must be a multiple of {len(PHASES)} (one part for each phase), got {intervals!r}")
     planned = PlannedStep(
-        per_phase=intervals // len(PHASES),
+        phase_grid=Grid(intervals=intervals // len(PHASES), rule=rule),
         balance=balance,
         angle_limits=angle_limits,
         shank_limits=shanks == "limited",
@@ -141,7 +151,7 @@ def _compute_signals(planned: PlannedStep, point: NumericPoint) -> Signals:
 
 
 def _simulate(point: NumericPoint) -> StepMotion:
-    fine = PlannedStep(per_phase=FINE_INTERVALS).samples(point, Exact())
+    fine = PlannedStep(phase_grid=Grid(intervals=FINE_INTERVALS)).samples(point, Exact())
     t, q, qd, qdd, stance = (
         np.array(ca.evalf(values)).T for values in (fine.time, fine.q, fine.qd, fine.qdd, fine.stance_force)
     )

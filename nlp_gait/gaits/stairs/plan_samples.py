@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.formulation import Array, Point
+from nlp_gait.formulation import Array, Grid, Point
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import planned_motion as planned
 from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan
@@ -61,10 +61,15 @@ class PlanSamples(NamedTuple):
 class PlannedStep:
     """Per-sample functions of a planned step and their grid."""
 
-    per_phase: int  # equal parts of each phase
+    phase_grid: Grid  # of each phase
     balance: BalanceRule = "feet"
     angle_limits: bool = True  # whether angles of links and knees are limited
     shank_limits: bool = False  # whether the shanks stay outside the steps
+
+    @property
+    def per_phase(self) -> int:
+        """Number of equal parts of each phase."""
+        return self.phase_grid.parts
 
     @cached_property
     def grid(self) -> tuple[DM, Array]:
@@ -96,14 +101,12 @@ class PlannedStep:
         return self._map_samples(make_place_function(gaps, ops), point, *(grid or self.grid))
 
     def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
-        """Return the integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
-        power = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
-        total = MX(0)
+        """Return the integral of sum |torque x rate| by the grid's rule, phase by phase [J]."""
+        power = ca.sum1(ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape))
+        total, weights = MX(0), DM(self.phase_grid.weights)
         for first in self._phase_starts:
-            durations = samples.time[first + self.per_phase] - samples.time[first]
-            ends = power[:, first] + power[:, first + self.per_phase]
-            inner = power[:, first : first + self.per_phase + 1]
-            total += durations / self.per_phase * (ca.sum1(ca.sum2(inner)) - ca.sum1(ends) / 2)
+            last = first + self.per_phase
+            total += (samples.time[last] - samples.time[first]) * (power[:, first : last + 1] @ weights)
         return total
 
     def jerk(self, samples: PlanSamples, quantum: MX) -> MX:
@@ -241,7 +244,7 @@ def make_place_function(measure: Callable[[Mapping[str, SX], Stair[SX]], SX], op
 def make_reach_function(per_phase: int) -> ca.Function:
     """Return the function of governing parameters, size and reach margin to cosines of both knees (2, m) at the samples."""
     inputs, _, _, step = make_step_symbols(Exact())
-    s, passing = PlannedStep(per_phase=per_phase).grid
+    s, passing = PlannedStep(phase_grid=Grid(intervals=per_phase)).grid
     one = ca.Function("reach", inputs, [ca.cse(step.reach)])
     given = [SX.sym("given", size.shape) for size in inputs[2:]]
     columns = s.shape[1]

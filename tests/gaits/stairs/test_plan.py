@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.integrate
 
 import nlp_gait
 from compare.judge import evaluate
@@ -98,3 +99,14 @@ def test_signals_have_one_row_for_each_sample(problem: GaitProblem) -> None:
     assert len(jumps) == 3  # both sides of each knot
     assert np.abs(arrays["q"][jumps] - arrays["q"][jumps + 1]).max() < 1e-9
     assert np.abs(arrays["qd"][jumps] - arrays["qd"][jumps + 1]).max() < 1e-9
+
+
+@pytest.mark.parametrize("rule", ["trapezoid", "simpson"])
+def test_energy_is_the_integral_of_power_by_the_rule(rule: str) -> None:
+    """Against SciPy, phase by phase; both ends of a phase are samples."""
+    problem = nlp_gait.load("stairs-plan", rule=rule)
+    x = problem.check_x(NEAR_BEST)
+    arrays, integrate = problem.signals(x).arrays, getattr(scipy.integrate, rule)
+    t, power = (np.split(values, 4) for values in (arrays["t"], np.abs(arrays["power"]).sum(axis=1)))
+    energy = sum(integrate(p, x=instants) for p, instants in zip(power, t, strict=True))
+    assert evaluate(problem, x).indexes["energy_J"] == pytest.approx(energy, rel=1e-12)

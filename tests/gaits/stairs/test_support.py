@@ -6,7 +6,7 @@ import pytest
 from casadi import SX
 
 import nlp_gait
-from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation import GaitProblem, Grid
 from nlp_gait.gaits.stairs.plan_samples import PlannedStep
 from nlp_gait.gaits.stairs.planar_biped import (
     GRAVITY,
@@ -58,7 +58,7 @@ def test_the_printed_zmp_differs_by_the_spin_of_links_only() -> None:
 def test_power_of_all_joints_is_the_change_of_mechanical_energy() -> None:
     """Ground forces act on points that stand still."""
     parts = 200
-    planned = PlannedStep(per_phase=parts, balance="polygon")
+    planned = PlannedStep(phase_grid=Grid(intervals=parts), balance="polygon")
     samples = planned.samples(load().at(NEAR_BEST), Exact())
     time, power, q = (np.array(ca.evalf(part)) for part in (samples.time, samples.power, samples.q))
     foot = place = np.zeros((2, q.shape[1]))
