@@ -82,7 +82,7 @@ class ProblemOptions:
             options["robot"] = self.robot
         if self.limits:
             if "limits" not in known:
-                raise InputError(f"{name} takes no limits; leave out --limit")
+                raise InputError(f"{name} takes no limits, those of NAO and of humanoids do; leave out --limit")
             options |= parse_options(spec.address, [("limits", ",".join(self.limits))])
         spec = spec.with_options(**options)
         problem = spec.load()
