@@ -4,13 +4,14 @@ The package sees the robot from the foot outwards; here the torso floats, the fo
 from the six rows of the base, which no motor drives.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from nlp_gait.formulation import Array, Signals
+from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import Link, Robot
 
 pin = pytest.importorskip("pinocchio")  # needs NumPy 2
@@ -158,3 +159,50 @@ def left_over(robot: Robot, signals: Signals, sample: int, gravity: float, stanc
         forces[index] = data.oMi[index].actInv(below.act(wrench))
     driven = [model.joints[model.getJointId(joint)].idx_v for joint in signals.joints]  # the head is locked
     return np.asarray((pin.rnea(model, data, q, v, a, forces) - tau)[[*range(6), *driven]])
+
+
+# Two double-precision algorithms on torques of up to some hundred Nm and a ZMP that divides by a force, and on places.
+ROUNDING, PLACES_M = 1e-8, 1e-12
+SOLE_Y_M = {"L": 0.05, "R": -0.05}  # of NAO
+
+
+def read_state(signals: Signals, sample: int) -> tuple[dict[str, float], ...]:
+    """Angles, rates and accelerations by joint."""
+    return tuple(
+        dict(zip(signals.joints, signals.arrays[name][sample].tolist(), strict=True)) for name in ("q", "qd", "qdd")
+    )
+
+
+def check_standing(signals: Signals, model: pin.Model, ankle: Array, samples: Iterable[int], *places: str) -> None:
+    """Compare torques, ZMP and these places, of com and hip, of NAO on its left foot."""
+    for sample in samples:
+        oracle = stand(model, "LAnkleRoll", ankle, *read_state(signals, sample), GRAVITY)
+        expected = [oracle.torques[joint] for joint in signals.joints]
+        np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(signals.arrays["zmp"][sample], oracle.zmp, rtol=0, atol=ROUNDING)
+        for place, at in (("com", oracle.com), ("hip", oracle.torso)):
+            if place in places:
+                np.testing.assert_allclose(signals.arrays[place][sample], at, rtol=0, atol=PLACES_M)
+
+
+def check_halves(signals: Signals, robot: Robot, rule: str, left_x: float, right_x: float) -> None:
+    """Compare torques and ZMP of NAO in double support with two halves, each of which floats and stands on its foot."""
+    checked = 0
+    for sample in range(11):
+        near_left = (signals.arrays["hip"][sample, 1] + 0.05) / 0.1  # 1 above the left foot, 0 above the right one
+        if not 0.0 < near_left < 1.0:
+            continue  # no body has a negative mass
+        left_share = near_left if rule == "lever" else 1.0 - near_left
+        halves: dict[str, Standing] = {}
+        for side, share, x in (("L", left_share, left_x), ("R", 1.0 - left_share, right_x)):
+            ankle = np.array([x, SOLE_Y_M[side], robot.feet["left"].ankle_height_m])
+            model = floating_model(robot, share, prefix=side)
+            halves[side] = stand(model, f"{side}AnkleRoll", ankle, *read_state(signals, sample), GRAVITY)
+        expected = [halves[joint[0]].torques[joint] for joint in signals.joints]
+        np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=ROUNDING)
+        loads = np.array([half.ground_load for half in halves.values()])
+        if (loads > 1.0).all():  # below a thousandth of the weight the model takes that share
+            zmp = sum(half.zmp * half.ground_load for half in halves.values()) / loads.sum()
+            np.testing.assert_allclose(signals.arrays["zmp"][sample], zmp, rtol=0, atol=ROUNDING)
+            checked += 1
+    assert checked > 0

@@ -14,7 +14,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result, load
 from nlp_gait.formulation.solution import Solution
 from nlp_gait.gaits.humanoid.body import GRAVITY
-from tests.pinocchio_oracle import floating_model, stand
+from tests.pinocchio_oracle import floating_model, read_state, stand
 from tests.robots.crooked import crooked
 
 pytest.importorskip("lxml")
@@ -58,13 +58,12 @@ def test_torques_and_zmp_are_pinocchios(problem: GaitProblem) -> None:
     robot = model.robot
     oracle, ankle = floating_model(robot), robot.joint_to[robot.feet["left"].link].name
     for x in reachable(problem, 4):
-        arrays = problem.signals(x).arrays
-        joints = problem.signals(x).joints
+        signals = problem.signals(x)
+        arrays = signals.arrays
         for k in (0, 2, 5):
-            q, qd, qdd = (dict(zip(joints, map(float, arrays[a][k]), strict=True)) for a in ("q", "qd", "qdd"))
             foot = arrays["left_foot"][k] + [0.0, 0.0, robot.feet["left"].ankle_height_m]
-            found = stand(oracle, ankle, foot, q, qd, qdd, GRAVITY)
-            expected = np.array([found.torques[joint] for joint in joints])
+            found = stand(oracle, ankle, foot, *read_state(signals, k), GRAVITY)
+            expected = np.array([found.torques[joint] for joint in signals.joints])
             largest = np.abs(expected).max()
             np.testing.assert_allclose(arrays["tau"][k] / largest, expected / largest, rtol=0, atol=TORQUE_TOLERANCE)
             np.testing.assert_allclose(arrays["zmp"][k], found.zmp, rtol=0, atol=ZMP_TOLERANCE_M)

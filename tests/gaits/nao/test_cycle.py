@@ -12,13 +12,11 @@ from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
-from tests.pinocchio_oracle import Standing, floating_model, stand
+from tests.pinocchio_oracle import check_halves, check_standing, floating_model
 from tests.properties.mirror import JOINT_SIGNS, partner
 
 # Asked for at both switches; it holds to rounding, for every x.
 CONTINUITY = 1e-8
-# Two double-precision algorithms on torques of some Nm; the ZMP divides a moment by a ground force.
-TORQUE_TOLERANCE_NM = ZMP_TOLERANCE_M = 1e-8
 # The same sums in another order.
 ROUNDING = 1e-12
 SEEDS = range(3)
@@ -116,11 +114,7 @@ def test_torques_and_zmp_of_single_support_are_pinocchios(sampled: list[Sampled]
     robot = load_robot("nao-v5")
     model, ankle = floating_model(robot), np.array([0.0, 0.05, robot.feet["left"].ankle_height_m])
     for _, single, _ in sampled:
-        for sample in range(11):
-            oracle = stand(model, "LAnkleRoll", ankle, *_state(single, sample), GRAVITY)
-            expected = [oracle.torques[joint] for joint in single.joints]
-            np.testing.assert_allclose(single.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
-            np.testing.assert_allclose(single.arrays["zmp"][sample], oracle.zmp, rtol=0, atol=ZMP_TOLERANCE_M)
+        check_standing(single, model, ankle, range(11))
 
 
 @pytest.mark.slow
@@ -129,29 +123,7 @@ def test_torques_and_zmp_of_double_support_are_pinocchios_halves(rule: str) -> N
     problem, robot = load("nao-cycle", torso_share=rule), load_robot("nao-v5")
     for x in candidates(problem)[:2]:
         _, double = phases(problem, x)
-        step = x[problem.variable_index("step_length_m")]
-        for sample in range(11):
-            near_left = (double.arrays["hip"][sample, 1] + 0.05) / 0.1
-            if not 0.0 < near_left < 1.0:
-                continue  # no body has a negative mass
-            left_share = near_left if rule == "lever" else 1.0 - near_left
-            halves: dict[str, Standing] = {}
-            for side, share, xy in (("L", left_share, (0.0, 0.05)), ("R", 1.0 - left_share, (step, -0.05))):
-                ankle = np.array([*xy, robot.feet["left"].ankle_height_m])
-                model = floating_model(robot, share, prefix=side)
-                halves[side] = stand(model, f"{side}AnkleRoll", ankle, *_state(double, sample), GRAVITY)
-            expected = [halves[joint[0]].torques[joint] for joint in double.joints]
-            np.testing.assert_allclose(double.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
-            loads = np.array([half.ground_load for half in halves.values()])
-            if (loads > 1.0).all():  # below a thousandth of the weight the model takes that share
-                zmp = sum(half.zmp * half.ground_load for half in halves.values()) / loads.sum()
-                np.testing.assert_allclose(double.arrays["zmp"][sample], zmp, rtol=0, atol=ZMP_TOLERANCE_M)
-
-
-def _state(signals: Signals, sample: int) -> tuple[dict[str, float], ...]:
-    return tuple(
-        dict(zip(signals.joints, map(float, signals.arrays[name][sample]), strict=True)) for name in ("q", "qd", "qdd")
-    )
+        check_halves(double, robot, rule, 0.0, x[problem.variable_index("step_length_m")])
 
 
 @pytest.mark.slow

@@ -8,19 +8,16 @@ import pytest
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
-from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.gaits.nao.leaning_torso import check_yaw_pitches
 from nlp_gait.robots import Robot, load_robot
 from tests.backends.toys import row_violations
 from tests.evaluation import check_power, evaluated
-from tests.pinocchio_oracle import Standing, floating_model, stand
+from tests.pinocchio_oracle import check_halves, floating_model
 
 pin = pytest.importorskip("pinocchio")  # needs NumPy 2
 
 # Two double-precision algorithms on torques of some Nm, a ZMP and a pose.
 TORQUE_TOLERANCE_NM, ZMP_TOLERANCE_M, POSE_TOLERANCE = 1e-8, 1e-8, 1e-9
-# Central differences over 1/1000 of the phase.
-DIFFERENCE_TOLERANCE = 1e-4
 OWN = 8
 PAPER = (0.30, 0.006, 0.0006, 0.03, 0.03, -0.05, -0.05, 1.0)
 ANKLES_XY = {"L": (0.06, 0.05), "R": (0.12, -0.05)}
@@ -87,18 +84,7 @@ def test_the_loop_closes_in_pinocchio(seed: int) -> None:
 @pytest.mark.parametrize("share", ["printed", "lever"])
 def test_torques_and_zmp_are_those_of_two_floating_halves(share: str) -> None:
     robot, signals = load_robot("nao-v5"), problem_of(share).signals(leaning(0))
-    for sample in range(11):
-        near_left = (signals.arrays["hip"][sample, 1] + 0.05) / 0.1
-        left_share = near_left if share == "lever" else 1.0 - near_left
-        halves: dict[str, Standing] = {}
-        for side, part in (("L", left_share), ("R", 1.0 - left_share)):
-            model = floating_model(robot, part, prefix=side)
-            halves[side] = stand(model, f"{side}AnkleRoll", ankle_of(robot, side), *at(signals, sample), GRAVITY)
-        expected = [halves[joint[0]].torques[joint] for joint in signals.joints]
-        loads = np.array([half.ground_load for half in halves.values()])
-        zmp = sum(half.zmp * half.ground_load for half in halves.values()) / loads.sum()
-        np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
-        np.testing.assert_allclose(signals.arrays["zmp"][sample], zmp, rtol=0, atol=ZMP_TOLERANCE_M)
+    check_halves(signals, robot, share, 0.06, 0.12)
 
 
 @pytest.mark.slow

@@ -7,12 +7,11 @@ import pytest
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, load
-from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.gaits.nao.free_joints import fit_joints
 from nlp_gait.robots import load_robot
 from tests.backends.toys import row_violations
 from tests.evaluation import check_power, evaluated
-from tests.pinocchio_oracle import floating_model, stand
+from tests.pinocchio_oracle import check_standing, floating_model
 
 # Two double-precision algorithms on torques of some Nm, a ZMP and a pose.
 TORQUE_TOLERANCE_NM, ZMP_TOLERANCE_M, POSITION_TOLERANCE_M = 1e-8, 1e-8, 1e-12
@@ -42,16 +41,7 @@ def test_torques_zmp_and_poses_are_those_of_a_floating_base_with_the_foot_held(s
     robot = load_robot("nao-v5")
     model, signals = floating_model(robot), problem_of().signals(leaning(seed))
     ankle = np.array([0.06, 0.05, robot.feet["left"].ankle_height_m])
-    for sample in range(11):
-        motion = [
-            dict(zip(signals.joints, signals.arrays[k][sample].tolist(), strict=True)) for k in ("q", "qd", "qdd")
-        ]
-        oracle = stand(model, "LAnkleRoll", ankle, *motion, GRAVITY)
-        expected = [oracle.torques[joint] for joint in signals.joints]
-        np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
-        np.testing.assert_allclose(signals.arrays["zmp"][sample], oracle.zmp, rtol=0, atol=ZMP_TOLERANCE_M)
-        np.testing.assert_allclose(signals.arrays["com"][sample], oracle.com, rtol=0, atol=POSITION_TOLERANCE_M)
-        np.testing.assert_allclose(signals.arrays["hip"][sample], oracle.torso, rtol=0, atol=POSITION_TOLERANCE_M)
+    check_standing(signals, model, ankle, range(11), "com", "hip")
 
 
 @pytest.mark.slow

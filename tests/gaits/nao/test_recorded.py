@@ -13,12 +13,11 @@ from nlp_gait.export.formats import write_as
 from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.signals import JointAngles
-from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.gaits.nao.joints import JOINTS
 from nlp_gait.gaits.nao.recorded import RecordedGait, make_recorded_gait
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import find_partner, mirror_sign
-from tests.pinocchio_oracle import floating_model, stand
+from tests.pinocchio_oracle import check_standing, floating_model
 
 ROBOT = load_robot("nao-v5")
 # Feasible points of the planned problems; a spline through samples 10 or 20 ms apart is this near to a cubic hip.
@@ -104,13 +103,7 @@ def test_torques_of_a_leaning_motion_are_pinocchios() -> None:
     assert gait.lean_deg > 1.0
     signals, model = gait.problem.signals(gait.x), floating_model(ROBOT)
     ankle = np.array(gait.motion.body.support)
-    for sample in range(0, 11, 2):
-        motion = [dict(zip(JOINTS, signals.arrays[k][sample].tolist(), strict=True)) for k in ("q", "qd", "qdd")]
-        oracle = stand(model, "LAnkleRoll", ankle, *motion, GRAVITY)
-        expected = [oracle.torques[joint] for joint in JOINTS]
-        np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=1e-8)
-        np.testing.assert_allclose(signals.arrays["zmp"][sample], oracle.zmp, rtol=0, atol=1e-8)
-        np.testing.assert_allclose(signals.arrays["hip"][sample], oracle.torso, rtol=0, atol=1e-12)
+    check_standing(signals, model, ankle, range(0, 11, 2), "hip")
 
 
 def angles_of_stance() -> np.ndarray:

@@ -10,24 +10,16 @@ import pytest
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
-from tests.pinocchio_oracle import Standing, floating_model, stand
+from tests.pinocchio_oracle import check_halves, check_standing, floating_model, read_state, stand
 
 # Two double-precision algorithms on torques of up to some hundred Nm.
 TORQUE_TOLERANCE_NM = 1e-8
-# The ZMP divides a moment by a ground force that may be small for an infeasible gait.
-ZMP_TOLERANCE_M = 1e-8
-COM_TOLERANCE_M = 1e-12
-# A reachable pose puts the torso where the plan wants it.
-TORSO_TOLERANCE_M = 1e-12
-# Central differences on a grid of 10,000 intervals err by 2e-7 rad/s and rad/s^2 here.
-DIFFERENCE_TOLERANCE = 1e-6
 
 FEASIBLE = {
     "nao-ssp": (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4.0),
     "nao-dsp": (0.31, 0.00683, 0.00007, 0.00485, 0.06828, -0.05291, -0.02170, 2.0),
 }
 SEEDS = range(6)
-SOLES_XY = {"L": (0.06, 0.05), "R": (0.12, -0.05)}  # section 4.2 [m]
 
 
 def motions(problem: GaitProblem) -> list[Array]:
@@ -52,13 +44,7 @@ def test_single_support_equals_a_floating_base_model_with_the_foot_held(robot: s
     model = floating_model(data)
     ankle = np.array([0.06, 0.05, data.feet["left"].ankle_height_m])
     for x in motions(problem):
-        signals = problem.signals(x)
-        for sample in range(11):
-            oracle = stand(model, "LAnkleRoll", ankle, *at(signals, sample), GRAVITY)
-            expected = [oracle.torques[joint] for joint in signals.joints]
-            np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
-            np.testing.assert_allclose(signals.arrays["zmp"][sample], oracle.zmp, rtol=0, atol=ZMP_TOLERANCE_M)
-            np.testing.assert_allclose(signals.arrays["com"][sample], oracle.com, rtol=0, atol=COM_TOLERANCE_M)
+        check_standing(problem.signals(x), model, ankle, range(11), "com")
 
 
 @pytest.mark.parametrize("robot", ["nao-v5", "nao-v6"])
@@ -74,10 +60,7 @@ def test_rotors_add_what_pinocchios_armature_adds(robot: str) -> None:
     x = np.array([*FEASIBLE["nao-ssp"][:-1], 0.5])  # accelerations 64 times as large
     signals = problem.signals(x)
     without = load("nao-ssp", robot=robot).signals(x)
-    for sample in (0, 3, 10):
-        oracle = stand(model, "LAnkleRoll", ankle, *at(signals, sample), GRAVITY)
-        expected = [oracle.torques[joint] for joint in signals.joints]
-        np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
+    check_standing(signals, model, ankle, (0, 3, 10))
     np.testing.assert_array_equal(signals.arrays["zmp"], without.arrays["zmp"])  # the ground does not feel them
     assert np.abs(signals.arrays["tau"] - without.arrays["tau"]).max() > 0.05
 
@@ -87,21 +70,7 @@ def test_rotors_add_what_pinocchios_armature_adds(robot: str) -> None:
 def test_double_support_equals_two_floating_halves_each_on_its_foot(rule: str) -> None:
     problem, data = load("nao-dsp", torso_share=rule), load_robot("nao-v5")
     for x in motions(problem):
-        signals = problem.signals(x)
-        for sample in range(11):
-            y = signals.arrays["hip"][sample, 1]
-            near_left = (y + 0.05) / 0.1  # 1 above the left foot, 0 above the right one
-            left_share = near_left if rule == "lever" else 1.0 - near_left
-            halves: dict[str, Standing] = {}
-            for side, share in (("L", left_share), ("R", 1.0 - left_share)):
-                ankle = np.array([*SOLES_XY[side], data.feet["left"].ankle_height_m])
-                model = floating_model(data, share, prefix=side)
-                halves[side] = stand(model, f"{side}AnkleRoll", ankle, *at(signals, sample), GRAVITY)
-            expected = [halves[joint[0]].torques[joint] for joint in signals.joints]
-            loads = np.array([half.ground_load for half in halves.values()])
-            zmp = sum(half.zmp * half.ground_load for half in halves.values()) / loads.sum()
-            np.testing.assert_allclose(signals.arrays["tau"][sample], expected, rtol=0, atol=TORQUE_TOLERANCE_NM)
-            np.testing.assert_allclose(signals.arrays["zmp"][sample], zmp, rtol=0, atol=ZMP_TOLERANCE_M)
+        check_halves(problem.signals(x), data, rule, 0.06, 0.12)
 
 
 @pytest.mark.slow
@@ -120,7 +89,7 @@ def test_separate_arms_load_no_leg_and_move_on_a_torso_at_rest(name: str, tmp_pa
     tau = separate.arrays["tau"]
     np.testing.assert_allclose(tau[:, legs], armless.arrays["tau"][:, legs], atol=1e-5)
     np.testing.assert_allclose(separate.arrays["zmp"], load(name).signals(x).arrays["zmp"], atol=TORQUE_TOLERANCE_NM)
-    oracle = stand(floating_model(robot), "torso", np.zeros(3), *at(separate, 3), GRAVITY)
+    oracle = stand(floating_model(robot), "torso", np.zeros(3), *read_state(separate, 3), GRAVITY)
     arms = [k for k in range(len(separate.joints)) if k not in legs]
     np.testing.assert_allclose(
         tau[3, arms], [oracle.torques[separate.joints[k]] for k in arms], atol=TORQUE_TOLERANCE_NM
