@@ -168,6 +168,7 @@ def test_limits_are_kept_by_the_contacts_of_a_simulated_gait() -> None:
         assert above == pytest.approx(rows[f"foot_clearance[sole, {k}]"], abs=0.002)  # [m]
 
 
+@pytest.mark.slow
 def test_a_limit_costs_what_it_must_and_is_guaranteed_between_samples() -> None:
     problem = nlp_gait.load("nao-ssp", intervals=4)
     higher = problem.with_limits(single_support=[FootClearance()]).with_values(foot_clearance_m=0.02)

@@ -64,6 +64,7 @@ def test_what_cannot_be_enclosed_is_sampled(monkeypatch: pytest.MonkeyPatch) -> 
         assert (found.feasible, found.how, found.enclosure) == (where, expected, None)
 
 
+@pytest.mark.slow
 def test_values_without_an_enclosure_prove_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     enclose = WALK.build_once(rounding._build_enclosure)
 

@@ -113,6 +113,7 @@ def test_the_study_file_can_run() -> None:
     assert len(study.tasks) == 2 * (31 + 31 + 2 * 31 + 31 + 11)
 
 
+@pytest.mark.slow
 def test_records_of_the_last_release_are_converted() -> None:
     """A run, one that polishes a search, and one of a problem that has lost an option."""
     convert = runpy.run_path(str(ROOT / "examples" / "read_last_release.py"))["convert"]

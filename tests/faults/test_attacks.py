@@ -1,7 +1,4 @@
-"""Attacks of every class with inputs drawn at random: none succeeds. One of each kind is in the default suite, all are slow.
-
-An attack returns None where it is repelled, by one sentence or by no effect, else what it reached.
-"""
+"""Forged studies that are consistent in themselves are not called whole, and no user code judges itself."""
 
 import json
 import re
@@ -105,7 +102,7 @@ def list_forgeries() -> Iterator[tuple[str, Forgery | Callable[[Path], None]]]:
         counts = ("evaluations", "history", "time_s")
         yield f"points and counts of {source}", copy_points(source, "pso", "iterations", *counts)
         yield f"all but inputs of {source}", copy_points(source, "pso", "status", *counts)
-    for solver in ("pso", "ga", "ipopt"):
+    for solver in ("pso", "ipopt"):
         yield f"counts of {solver}", edit(*HALF, solver=solver)
         yield f"fewer iterations of {solver}", edit(("iterations", 1), solver=solver)
         yield f"status of {solver}", edit(("status", "target reached"), solver=solver)
@@ -187,6 +184,7 @@ def test_fewer_runs_that_are_planned_as_such_are_an_honest_study_of_fewer(honest
     assert find_forged(honest, tmp_path / "forged", drop("ga", 2, planned=False)) is not None
 
 
+@pytest.mark.slow
 def test_the_honest_study_holds_and_says_what_was_not_checked(honest: Path) -> None:
     found = verify_folder(honest)
     assert all(finding.holds for finding in found.findings), [f.sentence for f in found.findings]

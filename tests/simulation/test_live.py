@@ -77,6 +77,7 @@ def open_window(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     return replace
 
 
+@pytest.mark.slow
 def test_a_watched_simulation_is_the_same(plan: Plan, open_window: Callable[..., None]) -> None:
     expected = simulate_plan(plan)
     for pictures in (10**6, 3):  # to the end, or until the window is closed
@@ -86,6 +87,7 @@ def test_a_watched_simulation_is_the_same(plan: Plan, open_window: Callable[...,
         np.testing.assert_array_equal(run.finish().states, expected.states)
 
 
+@pytest.mark.slow
 def test_arrow_keys_push_forward_and_to_the_left(plan: Plan, open_window: Callable[..., None]) -> None:
     unpushed = simulate_plan(plan)
     for key, axis in ((UP, 0), (LEFT, 1)):
@@ -109,6 +111,7 @@ def stored(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_without_a_display_it_is_simulated_and_the_command_fails_with_one_sentence(
     stored: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

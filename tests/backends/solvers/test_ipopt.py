@@ -55,6 +55,7 @@ def test_prices_are_what_a_changed_limit_costs(phase: str, request: pytest.Fixtu
         assert (again.objective - solution.objective) / PRICE_STEP == pytest.approx(bound.price, rel=PRICE_TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_solution_accounts_for_its_work(single_support: tuple[GaitProblem, Solution]) -> None:
     problem, solution = single_support
     counts = asdict(solution.evaluations)
@@ -187,6 +188,7 @@ def test_widths_of_ones_own_narrow_from_stage_to_stage() -> None:
             IpoptSettings(widths=widths)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("margin_m", "compiled"), [(0.05, False), (0.065, True)])
 def test_the_usual_widths_end_at_the_gait_of_narrower_ones(margin_m: float, compiled: bool) -> None:
     problem = load("nao-ssp").with_values(dbm_x_mean_limit_m=margin_m)  # 0.065: samples stay at the edge of the jump

@@ -72,6 +72,7 @@ def test_an_archive_has_everything_and_every_run_can_be_repeated(files: Files, t
     assert findings[-1].sentence == "repeated runs: holds: 5 have the same results, to the last bit"
 
 
+@pytest.mark.slow
 def test_every_damage_is_named(files: Files, tmp_path: Path) -> None:
     for k, (name, content, word) in enumerate(damage(files, find_record(files))):
         wrong = [finding.detail for finding in verify(content, tmp_path / str(k)) if finding.holds is False]
@@ -86,6 +87,7 @@ def test_every_forgery_with_a_fitting_manifest_is_named(files: Files, tmp_path: 
         assert len(wrong) == 1 and word in wrong[0], (name, wrong)
 
 
+@pytest.mark.slow
 def test_a_forged_course_is_found_by_repeating_the_run(files: Files, tmp_path: Path) -> None:
     """Nothing else can tell that a search was faster than it was."""
 

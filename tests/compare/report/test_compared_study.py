@@ -16,6 +16,7 @@ def study() -> ComparedStudy:
     return nlp_gait.compare(["nao-dsp", "nao-ssp"], solvers, runs=3, starts=1, evaluations=300)
 
 
+@pytest.mark.slow
 def test_one_call_compares_searches_with_ipopt(study: ComparedStudy, tmp_path: Path) -> None:
     assert [len(comparison.solvers) for comparison in study.comparisons] == [3, 3]
     assert str(study).startswith("On nao-dsp the best power is 0.531886 W, proven optimal")
@@ -28,6 +29,7 @@ def test_one_call_compares_searches_with_ipopt(study: ComparedStudy, tmp_path: P
         study.table("nao-dps")
 
 
+@pytest.mark.slow
 def test_tables_for_papers_show_different_digits_gaps_and_marks(study: ComparedStudy) -> None:
     text = study.latex()
     assert text.count(r"\begin{tabular}") == 3 and r"\cdot 10^{-1}" in text
