@@ -94,14 +94,6 @@ def test_every_option_is_recorded(name: str) -> None:
         assert (again.names, again.grid, again.parameters) == (problem.names, problem.grid, problem.parameters)
 
 
-@pytest.mark.parametrize("option", others("walk12"))
-def test_the_inputs_of_a_run_have_each_option(option: str) -> None:
-    asked = make_task("walk12", {option: others("walk12")[option]})
-    problem = asked.problem.load()
-    assert make_task(problem.name, problem.options).inputs() == asked.inputs()
-    assert asked.inputs().key != make_task("walk12", {}).inputs().key
-
-
 # The cycle stands for the humanoid's other problems, which take the same bodies and phases.
 RELOADED = [name for name in PROBLEMS if name == "humanoid-cycle" or not name.startswith("humanoid-")]
 

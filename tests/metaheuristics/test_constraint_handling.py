@@ -71,18 +71,6 @@ def test_marking_copies_and_marks_both() -> None:
     assert np.isnan(f[1]) and v[0] == 0.0
 
 
-def test_epsilon_falls_to_zero_at_the_control_fraction() -> None:
-    handling = EpsilonLevel(share=0.5, exponent=2.0, control=0.8)
-    initial = np.array([4.0, 1.0, np.inf, 3.0, 2.0])  # finite ones sorted: 1, 2, 3, 4; a share of a half gives 3
-    assert handling.epsilon(0.0, initial) == 3.0
-    assert handling.epsilon(0.4, initial) == 3.0 * 0.5**2
-    assert handling.epsilon(0.8, initial) == handling.epsilon(1.0, initial) == 0.0
-    assert handling.epsilon(0.0, np.array([np.inf])) == 0.0
-    f, v = np.array([0.0, 1.0, 2.0]), np.array([2.9, 0.0, 3.1])
-    assert handling.rule(0.0, initial).order(f, v).tolist() == [0, 1, 2]
-    assert handling.rule(0.9, initial).order(f, v).tolist() == [1, 0, 2]
-
-
 def test_epsilon_begins_at_the_violation_below_which_the_share_lies_and_ends_at_the_control_fraction() -> None:
     """Takahama and Sakai (2006): theta 0.2, cp 5, and here Tc = 0.8 T."""
     assert EpsilonLevel() == EpsilonLevel(share=0.2, exponent=5.0, control=0.8)

@@ -1,6 +1,5 @@
 """Settings and the registry: what is refused, and how it is said."""
 
-import dataclasses
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -121,11 +120,6 @@ def test_unknown_names_are_answered_with_near_ones(
 ) -> None:
     with pytest.raises(SearchError, match=message):
         make(name, **settings)
-
-
-def test_settings_are_immutable() -> None:
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        ParticleSwarm().inertia = 0.5  # type: ignore[misc]
 
 
 def test_the_settings_of_goswami_2008() -> None:

@@ -6,7 +6,7 @@ import pytest
 from casadi import DM, MX, SX
 
 import nlp_gait
-from nlp_gait.backends.derivatives import first_order, plan
+from nlp_gait.backends.derivatives import first_order
 from nlp_gait.backends.derivatives.assembly import make_nlp_plan
 from nlp_gait.backends.derivatives.compiled import CompiledNlp
 from nlp_gait.backends.derivatives.structure import NotMapped, split_nlp
@@ -87,12 +87,6 @@ def test_a_hessian_of_zero_is_compiled_too() -> None:
     nlp = {"x": x, "p": p, "f": 2 * x[0] - p * x[1], "g": x[0] + 3 * x[1]}
     assert compared(nlp, np.array([1.5]), np.array([[0.3, 0.4], [2.0, -1.0]])) < TOLERANCE
     assert CompiledNlp(nlp, np.array([1.5])).functions["nlp_hess_l"].nnz_out() == 0
-
-
-def test_runs_extend_while_both_lists_increase_by_one() -> None:
-    targets, sources = np.array([4, 5, 6, 9, 10]), np.array([1, 2, 3, 4, 6])
-    assert plan.find_runs(targets, sources) == [(4, 1, 3), (9, 4, 1), (10, 6, 1)]
-    assert plan.find_runs(targets[:1], sources[:1]) == [(4, 1, 1)] and plan.find_runs(targets[:0], sources[:0]) == []
 
 
 def test_an_nlp_that_cannot_be_split_is_refused() -> None:

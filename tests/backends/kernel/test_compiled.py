@@ -69,17 +69,6 @@ def test_agrees_with_the_virtual_machine(name: str, lanes: int) -> None:
     np.testing.assert_allclose(total, violation, rtol=ROW_TOLERANCE, atol=ROW_TOLERANCE)
 
 
-@pytest.mark.parametrize("lanes", LANES)
-def test_batch_size_changes_no_bit(lanes: int) -> None:
-    problem = toy(corner)
-    objective, X = compile_objective(problem, require_compiler=True, lanes=lanes), candidates(problem, 203)
-    f, violation = objective(X)
-    for size in (1, 3, 8, 50):
-        parts = [objective(X[i : i + size]) for i in range(0, len(X), size)]
-        assert np.array_equal(np.concatenate([part[0] for part in parts]), f)
-        assert np.array_equal(np.concatenate([part[1] for part in parts]), violation)
-
-
 def test_takes_any_memory_and_leaves_it_as_it_was() -> None:
     problem = problem_named("nao-ssp")
     objective, X = read_objective("nao-ssp"), candidates(problem, 21)

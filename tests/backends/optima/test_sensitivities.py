@@ -2,13 +2,11 @@
 
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 import pytest
 from casadi import MX
 
 from nlp_gait import load, solve
-from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import differentiate_by_models, differentiate_by_parameters
 from nlp_gait.backends.solve import Continuation, find_cheapest_feasible
@@ -130,32 +128,6 @@ def test_slopes_are_those_of_solving_again(name: str, parameters: tuple[str, ...
         np.testing.assert_allclose(
             answer.x[:, i] / problem.scale, x / problem.scale, atol=RESOLVED_X * max(largest, 1.0)
         )
-
-
-@pytest.mark.slow
-def test_casadis_own_sensitivities_agree() -> None:
-    """Of its SQP method with an active-set QP solver, where no active rows depend on each other."""
-    problem = load("walk12")
-    at = found(problem)
-    model = build_nlp(problem)
-    silent = {"print_header": False, "print_iteration": False, "print_status": False, "print_time": False}
-    qp = {"print_iter": False, "print_header": False, "error_on_fail": False}
-    solver = ca.nlpsol("oracle", "sqpmethod", model.nlp, {**silent, "qpsol": "qrqp", "qpsol_options": qp})
-    lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
-    bounds = {
-        "lbx": (problem.lower - model.offset) / model.scale,
-        "ubx": (problem.upper - model.offset) / model.scale,
-        "lbg": lower,
-        "ubg": upper,
-    }
-    solution = solver(x0=at.w, p=at.parameters, lam_g0=at.multipliers[: len(lower)], **bounds)
-    jacobian = solver.factory("jacobian", solver.name_in(), ["jac:x:p"])
-    by_casadi = jacobian(
-        x0=solution["x"], p=at.parameters, lam_x0=solution["lam_x"], lam_g0=solution["lam_g"], **bounds
-    )["jac_x_p"]
-    own = len(problem.own_parameters)  # the bounds of x are no parameters to CasADi
-    expected = model.scale[:, None] * np.array(by_casadi)[:, :own]
-    np.testing.assert_allclose(differentiate_by_parameters(at).x[:, :own], expected, atol=1e-6)
 
 
 @pytest.mark.slow

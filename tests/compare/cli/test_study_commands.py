@@ -57,15 +57,6 @@ def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path) -> N
     assert "little-pso" in (tmp_path / "report.md").read_text()
 
 
-def test_a_search_is_polished(tmp_path: Path) -> None:
-    search = (
-        "compare nao-ssp --algorithms pso --starts 0 --runs 1 --evaluations 2000 --polish --handling epsilon --jobs 1"
-    )
-    run, polished = as_json(*search.split(), "--out", tmp_path)["runs"]
-    assert run["status"] == "evaluation budget used" and run["evaluations"] == 2000
-    assert polished["claimed_objective"] == pytest.approx(0.845868, rel=1e-5)
-
-
 def test_all_are_the_installed_searches_and_both_gradient_methods(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules[list_solver_names.__module__], "list_installed_algorithms", lambda: ("pso", "de"))
     names = list_solver_names("all,ga", 5)

@@ -31,30 +31,6 @@ def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coarse_pictures: None)
     return tmp_path / "my.py"
 
 
-def edited(file: Path, old: str, new: str) -> None:
-    text = file.read_text()
-    assert text.count(old) == 1
-    file.write_text(text.replace(old, new))
-
-
-def test_an_edit_of_their_file_recomputes_their_runs(mine: Path) -> None:
-    names = "pso,my.py:Shrinking,my.py:annealing"
-    call = ["compare", "my.py:two_link", "--set", "intervals=10", "--algorithms", names]
-    call += ["--runs", "1", "--starts", "1", "--evaluations", "300"]
-
-    def count_files() -> int:
-        nlp_gait(*call, "--jobs", "1", "--out", "study")
-        return len(list(Path("study").glob("records/two_link/*.json")))
-
-    assert count_files() == 4
-    edited(mine, "shrink: float = 0.95", "shrink: float = 0.90")
-    assert count_files() == 4 + 2  # its searches: the problem in it has the same values
-    edited(mine, "shrink: float = 0.90", "shrink: float = 0.95")
-    assert count_files() == 4 + 2
-    report = nlp_gait("report", "study").stdout and Path("study/report.md").read_text()
-    assert "Shrinking" in report and "two_link" in report
-
-
 def test_every_command_takes_them(mine: Path) -> None:
     best = as_json("solve", "my.py:two_link", "--starts", "3", "--out", "best.json", "--set", "intervals=10")
     assert best["problem"] == "my.py:two_link" and best["claimed"] and best["feasible"]

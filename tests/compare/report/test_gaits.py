@@ -10,7 +10,7 @@ from compare.drawing.gait_figure import draw_gaits, make_gait_charts, measure_de
 from compare.report.study_sections import load_gaits
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import Limb, Skeleton
-from tests.compare.records import DSP_X, record, study
+from tests.compare.records import DSP_X, record
 
 
 def comparison(name: str, x: dict[str, float], *solvers: str) -> Comparison:
@@ -52,7 +52,3 @@ def test_what_cannot_be_drawn_is_reported(name: str, x: dict[str, float], why: s
     """Code that a record names is not run for it."""
     part = load_gaits(comparison(name, x, "pso"))
     assert isinstance(part, str) and part.startswith("The gaits are not drawn: ") and why in part
-
-
-def test_an_unknown_problem_does_not_fail_the_report() -> None:
-    assert "unknown problem 'walk'" in str(load_gaits(compare_problems(study())[0]))

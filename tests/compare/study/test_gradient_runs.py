@@ -38,13 +38,6 @@ def test_slsqp_keeps_its_best_point_within_the_budget() -> None:
 
 
 @pytest.mark.slow
-def test_slsqp_leaves_fixed_variables_alone() -> None:
-    fixed = ProblemSpec(name="nao-ssp", values=dict(SSP.load().fix(swing_height_m=0.02).values))
-    record = run_task(Task(problem=fixed, solver="slsqp", run=1))
-    assert record.x["swing_height_m"] == 0.02 and record.verdict.feasible
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fatrop", "sqpmethod", "uno"])
 def test_other_nlp_solvers_reach_the_same_optimum(name: str) -> None:
     reason = nlpsol.probe(name)
