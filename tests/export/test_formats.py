@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.errors import InputError, OutputError, UnknownNameError
-from nlp_gait.export.formats import FORMATS, write_as
-from nlp_gait.formulation import Result, list_problems, load_result
+from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.export.formats import write_as
+from nlp_gait.formulation import Result, list_problems
 from nlp_gait.formulation.result import sample_at_period
 
 DSP = (0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, 2)
@@ -58,17 +58,6 @@ def test_every_time_history_of_every_problem_has_its_unit(name):
         assert units.get(column, unit) == unit
     if name == "stairs-plan":
         assert expected.keys() <= units.keys()
-
-
-@pytest.mark.slow
-def test_json_can_be_simulated_again(result, tmp_path):
-    path = tmp_path / "gait.json"
-    write_as("json", path, result, 200)
-    data = json.loads(path.read_text())
-    assert data["signals"]["qd RHipPitch"]["unit"] == "rad/s" and len(data["signals"]["t"]["values"]) == 11
-    again = load_result(path)
-    np.testing.assert_array_equal(again.x, result.x)
-    assert again.problem.value("torque_change_limit_Nm") == 1.0
 
 
 def test_ros_trajectory_is_exactly_periodic_and_agrees_with_the_csv(result, tmp_path):
@@ -147,10 +136,3 @@ def test_what_a_problem_has_not_is_refused(tmp_path):
     assert ",left_stance" in (tmp_path / "x.csv").read_text().splitlines()[0]
     with pytest.raises(UnknownNameError, match="webots"):
         write_as("webot", tmp_path / "x", walk, 40)
-
-
-@pytest.mark.parametrize("name", sorted(FORMATS))
-def test_an_unwritable_path_is_an_output_error_and_leaves_nothing(result, tmp_path, name):
-    with pytest.raises(OutputError, match="cannot write"):
-        write_as(name, tmp_path / "no" / "folder", result, 200)
-    assert list(tmp_path.iterdir()) == []

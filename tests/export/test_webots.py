@@ -58,16 +58,6 @@ def test_a_gait_is_written_every_40_ms_and_read_back(points):
     assert text.splitlines()[1].startswith("00:00:000,Pose1,")
 
 
-def test_set_points_are_the_planned_angles(points):
-    problem = nlp_gait.load("nao-ssp")
-    signals = problem.signals(problem.check_x(OPTIMUM))  # 11 samples, 400 ms apart
-    np.testing.assert_allclose(points.arrays["q"][::10], signals.arrays["q"], atol=1e-9)
-
-
-def test_the_last_pose_is_the_end_of_the_phase():
-    assert sampled((*OPTIMUM[:-1], 0.4567))["t"][-3:].tolist() == [0.36, 0.4, 0.44]
-
-
 @pytest.mark.slow
 @given(
     st.lists(st.integers(0, 5_000_000), min_size=1, max_size=6, unique=True),

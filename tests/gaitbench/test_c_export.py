@@ -134,28 +134,3 @@ def test_called_from_octave(built: tuple[str, Path], tmp_path: Path) -> None:
         timeout=120,
     )
     assert "one point a row" in refused.stderr
-
-
-@pytest.mark.slow
-def test_two_instances_stand_in_one_program(tmp_path: Path) -> None:
-    """Their names do not clash; each says its own optimum. Four points at a time give the same as one."""
-    lines = []
-    for id in IDS:
-        export_objective(gaitbench.load(id), tmp_path)
-        lines += [f'#include "{make_prefix(id)}.h"']
-    calls = "\n".join(
-        f'  {make_prefix(id)}_evaluate({make_prefix(id)}_best_x, 1, &f, &v, 0); printf("%.17g %.17g\\n", f, v);'
-        for id in IDS
-    )
-    (tmp_path / "both.c").write_text(
-        "\n".join(["#include <stdio.h>", *lines, "int main(void) {", "  double f, v;", calls, "  return 0;", "}", ""])
-    )
-    flags = ["-std=c++17", "-O1", "-DLANES=2", "-ffp-contract=off", "-w", "-c"]
-    for id in IDS:
-        subprocess.run(["c++", *flags, f"{make_prefix(id)}.cpp"], cwd=tmp_path, check=True, timeout=300)
-    objects = [f"{make_prefix(id)}.o" for id in IDS]
-    subprocess.run(["cc", "-o", "both", "both.c", *objects, "-lm"], cwd=tmp_path, check=True, timeout=60)
-    done = subprocess.run([str(tmp_path / "both")], capture_output=True, text=True, check=True, timeout=60)
-    for line, id in zip(done.stdout.splitlines(), IDS, strict=True):
-        f, violation = map(float, line.split())
-        assert f == pytest.approx(gaitbench.load(id).best_known, rel=EQUAL) and violation == 0.0

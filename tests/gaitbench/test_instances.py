@@ -1,9 +1,6 @@
 """Every instance is what it was when it was published, and one object serves threads, processes and derivatives."""
 
 import json
-import multiprocessing
-import pickle
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,11 +9,10 @@ import pytest
 
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.formulation import Array, load
+from nlp_gait.formulation import Array
 from nlp_gait.gaitbench import best_known
 from nlp_gait.gaitbench.best_known import check_shipped_facts
 from nlp_gait.gaitbench.facts import DEFINITIONS, load_facts
-from nlp_gait.gaitbench.transform import hold_constant
 
 # A published value may change by rounding alone: other compilers, other widths of SIMD.
 PUBLISHED = 1e-12
@@ -153,12 +149,6 @@ def test_a_constant_is_not_a_variable() -> None:
     assert dense is not None and dense.names == instance.names
 
 
-def test_bounds_of_a_constant_are_removed() -> None:
-    walk = load("walk12").with_values(**{"step_length_m.lower": 0.06, "lambda": 0.3})
-    found = hold_constant(walk, {"step_length_m": 0.1})
-    assert dict(found.values) == {"lambda": 0.3} and found.value("step_length_m") == 0.1
-
-
 @pytest.mark.usefixtures("without_compiler")
 def test_the_one_equation_of_splines_is_a_band() -> None:
     """The foot passes the middle of its path within a tenth of a millimetre to either side."""
@@ -167,31 +157,6 @@ def test_the_one_equation_of_splines_is_a_band() -> None:
     G = instance.rows(points(instance))[:, rows]
     assert len(rows) == 2
     np.testing.assert_allclose(G.sum(axis=1), -2 * 1e-2, rtol=1e-9)  # of the scale, a centimetre
-
-
-@pytest.mark.slow
-def test_threads_and_processes_find_the_same_values() -> None:
-    instance = gaitbench.load("ssp-v5")
-    X = points(instance, 400)
-    expected = instance(X)
-    with ThreadPoolExecutor(8) as threads:
-        for found in threads.map(instance, [X] * 32):
-            np.testing.assert_array_equal(found, expected)
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as processes:
-        np.testing.assert_array_equal(processes.submit(instance, X).result(), expected)
-
-
-@pytest.mark.parametrize("unit_cube", [False, True])
-def test_a_pickle_is_the_instance(unit_cube: bool) -> None:
-    instance = gaitbench.load("ssp-v5", unit_cube=unit_cube)
-    assert repr(instance) == f"<GaitBench ssp-v5: 9 variables, {len(instance.row_names)} inequalities>"
-    for bounds in (instance.lower, instance.upper):
-        with pytest.raises(ValueError, match="read-only"):
-            bounds[0] = 0.0
-    again = pickle.loads(pickle.dumps(instance))
-    assert (again.id, again.unit_cube, again.names) == (instance.id, unit_cube, instance.names)
-    np.testing.assert_array_equal(again(again.best_x[None]), instance(instance.best_x[None]))
-    assert len(pickle.dumps(instance)) < 1000
 
 
 def test_evidence_says_what_it_rests_on() -> None:

@@ -1,16 +1,14 @@
 """Robot files: the three NAOs, and a message for everything that can be wrong."""
 
-import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from unittest.mock import Mock
 
 import pytest
 
-from nlp_gait.errors import RobotDataError, UnknownNameError
-from nlp_gait.robots import list_robots, load_robot, loading
+from nlp_gait.errors import RobotDataError
+from nlp_gait.robots import list_robots, load_robot
 from tests.robots.custom import written
 
 
@@ -156,22 +154,6 @@ def test_robots_that_extend_each_other_by_roundabout_paths_are_refused(tmp_path:
         load_robot(str(tmp_path / "a.json"))
 
 
-def test_a_file_is_extended_from_the_folder_of_the_one_that_names_it(tmp_path: Path) -> None:
-    folder = tmp_path / "robots"
-    folder.mkdir()
-    (folder / "base.json").write_text(json.dumps(tiny()), encoding="utf-8")
-    raw = {"schema": 1, "name": "child", "extends": "base.json", "links": {"torso": link(mass=7.0)}}
-    (folder / "child.json").write_text(json.dumps(raw), encoding="utf-8")
-    assert load_robot(str(folder / "child.json")).links["torso"].mass_kg == 7.0
-
-
-def test_an_unknown_robot_or_joint_gets_the_nearest_names() -> None:
-    with pytest.raises(UnknownNameError, match=r"unknown robot 'nao_v5'; did you mean .*'nao-v5'"):
-        load_robot("nao_v5")
-    with pytest.raises(UnknownNameError, match=r"unknown joint of robot nao-v5 'LKnee'; did you mean 'LKneePitch'"):
-        load_robot("nao-v5").joint("LKnee")
-
-
 @pytest.mark.parametrize(("name", "mass_kg"), [("nao-v4", 5.19535), ("nao-v5", 5.30535), ("nao-v6", 5.35975)])
 def test_nao_weighs_what_its_maker_says(name: str, mass_kg: float) -> None:
     assert name in list_robots()
@@ -194,27 +176,3 @@ def test_a_file_that_extends_a_robot_replaces_single_records(tmp_path: Path) -> 
     heavy = load_robot(written(tmp_path, raw))
     assert heavy.mass_kg == pytest.approx(base.mass_kg - base.links["LThigh"].mass_kg + 9.0)
     assert heavy.joints == base.joints
-
-
-def test_records_made_in_code_are_checked_like_those_of_a_file() -> None:
-    robot = load_robot("nao-v5")
-    thigh = dataclasses.replace(robot.links["LThigh"], com_m=(0.0, float("nan"), 0.0))
-    with pytest.raises(
-        RobotDataError, match=r"link 'LThigh': com_m must be finite numbers within 1e\+09, got \(0\.0, nan"
-    ):
-        dataclasses.replace(robot, links={**robot.links, "LThigh": thigh})
-    for owner, name in ((robot, "name"), (robot.links["torso"], "mass_kg")):
-        with pytest.raises(AttributeError):
-            setattr(owner, name, None)
-
-
-def test_robot_of_a_file_is_read_once_while_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    read = Mock(wraps=loading._read)
-    monkeypatch.setattr(loading, "_read", read)
-    path = written(tmp_path, tiny())
-    with loading.hold_robots():
-        robot = load_robot(path)
-        with loading.hold_robots():
-            assert load_robot(path) is robot
-        assert load_robot(path) is robot and read.call_count == 1
-    assert load_robot(path) is not robot

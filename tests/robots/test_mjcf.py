@@ -95,21 +95,3 @@ def test_the_engines_warnings_go_where_they_went_before(path: str, tmp_path: Pat
         assert mujoco.get_mju_user_warning() == texts.append
     finally:
         mujoco.set_mju_user_warning(None)
-
-
-def test_a_warning_while_a_robot_is_read_is_logged(
-    path: str, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of MuJoCo's compiler, in this package's log and in no file."""
-
-    def warn(_: str) -> list[str]:
-        mujoco.get_mju_user_warning()("a tensor was fixed")
-        return []
-
-    monkeypatch.setattr(mujoco, "mju_getXMLDependencies", warn)
-    monkeypatch.chdir(tmp_path)
-    robot = tmp_path / "robot.xml"
-    robot.write_text(Path(path).read_text(encoding="utf-8"), encoding="utf-8")
-    load_robot(str(robot))
-    assert f"robot file {str(robot)!r}: a tensor was fixed" in caplog.messages
-    assert list(tmp_path.iterdir()) == [robot]

@@ -24,12 +24,6 @@ def test_masses_and_inertias_scale() -> None:
     assert heavy.links["LThigh"].com_m == NAO.links["LThigh"].com_m
 
 
-def test_a_duplicate_change_is_refused() -> None:
-    for twice in ("mass=2,mass=3", "mass=2, mass =2", "thigh_m=0.001,mass=2,thigh_m=0.002"):
-        with pytest.raises(InputError, match="(mass|thigh_m) is duplicated"):
-            load_robot(f"nao-v5@{twice}")
-
-
 def test_both_legs_get_longer() -> None:
     tall = perturb(NAO, {"thigh_m": 0.001, "tibia_m": -0.002})
     for side in "LR":
@@ -98,8 +92,3 @@ def test_every_quantity_can_be_changed() -> None:
 def test_impossible_changes_are_refused(changes: dict[str, float], error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
         perturb(NAO, changes)
-
-
-def test_a_name_with_nonsense_behind_the_mark_says_what_it_takes() -> None:
-    with pytest.raises(InputError, match="NAME=NUMBER"):
-        load_robot("nao-v5@heavier")

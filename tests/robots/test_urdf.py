@@ -108,15 +108,6 @@ def test_wheels_and_missing_axes_get_the_defaults_of_the_format(tmp_path: Path) 
     assert yaw.limits_rad == (-np.pi, np.pi)
 
 
-def test_shapes_and_plugins_are_not_even_parsed(tmp_path: Path) -> None:
-    tree = as_urdf(nao())
-    thigh = tree.find("link[@name='LThigh']")
-    assert thigh is not None
-    ElementTree.SubElement(ElementTree.SubElement(thigh, "visual"), "nonsense")
-    ElementTree.SubElement(tree, "gazebo").text = "nonsense"
-    assert_same(load_robot(stored(tmp_path, tree)), load_robot("nao-v5"))
-
-
 @pytest.mark.parametrize("about_com_too", [False, True])
 def test_tensors_about_the_joints_are_shifted_if_the_file_says_so(tmp_path: Path, about_com_too: bool) -> None:
     """Also for links in other axes than the root's, and for a link that the robot file adds."""
@@ -153,21 +144,12 @@ DAMAGES = [
         r"link 'LThigh': <inertia> needs the attribute 'izz'",
     ),
     (change("link[@name='LThigh']/inertial/mass"), r"link 'LThigh': <inertial> must have one <mass>, got 0"),
-    (change("link[@name='LThigh']/inertial"), r"link 'LThigh': mass_kg must be > 0, got 0\.0"),
     (change(f"{KNEE}/origin", "rpy", "0 0 x"), r"joint 'LKneePitch': rpy of <origin> must be 3 finite numbers"),
     (
         change(f"{KNEE}/origin", "xyz", "nan 0 0"),
         r"joint 'LKneePitch': xyz of <origin> must be 3 finite .* 'nan 0 0'",
     ),
-    (
-        change("link[@name='LTibia']/inertial/origin", "xyz", "0 inf 0"),
-        r"link 'LTibia': xyz of <origin> must be 3 finite",
-    ),
     (change(f"{KNEE}/limit"), r"joint 'LKneePitch': <joint> must have one <limit>, got 0"),
-    (change(f"{KNEE}/limit", "effort", "0"), r"joint 'LKneePitch': torque_limit_Nm must be > 0"),
-    (change(f"{KNEE}/axis", "xyz", "0 0 0"), r"joint 'LKneePitch': axis must be a unit vector"),
-    (change(f"{KNEE}/parent", "link", "tail"), r"joint 'LKneePitch': link 'tail' does not exist"),
-    (change(f"{KNEE}/child", "link", "RTibia"), r"link 'RTibia' already has a parent"),
     (change(f"{KNEE}/parent", "link", "l_ankle"), r"joint 'LKneePitch' is part of a ring of joints"),
     (change(f"{KNEE}/child", "link", "torso"), r"exactly one link must have no parent, got LTibia|ring|none"),
     (change(KNEE, "name", "RKneePitch"), r"joint 'RKneePitch' appears twice"),
@@ -202,11 +184,6 @@ def test_what_is_not_a_urdf_is_reported(tmp_path: Path, text: str, message: str)
         load_robot(stored(tmp_path, text))
 
 
-def test_a_missing_urdf_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RobotDataError, match=r"nowhere\.urdf' cannot be read"):
-        load_robot(written(tmp_path, partner(nao(), "nowhere.urdf")))
-
-
 LAUGHS = "".join(f'<!ENTITY l{k} "{f"&l{k - 1};" * 10}">' for k in range(1, 12))
 ENTITIES = {
     "another file": ('<!ENTITY e SYSTEM "secret.txt">', "&e;"),
@@ -233,11 +210,6 @@ def test_a_urdf_alone_without_shapes_is_answered_with_what_to_write(tmp_path: Pa
     (tmp_path / "robot.json").unlink()
     with pytest.raises(RobotDataError, match=r"no shape for its sole; write its sole into the JSON"):
         load_robot(path)
-
-
-def test_a_roundabout_path_to_a_urdf_is_the_same_path(tmp_path: Path) -> None:
-    path = Path(stored(tmp_path, as_urdf(nao())))
-    assert load_robot(f"{path.parent}/../{path.parent.name}/{path.name}").name == "nao-v5"
 
 
 def test_the_robot_file_next_to_a_urdf_must_extend_it(tmp_path: Path) -> None:

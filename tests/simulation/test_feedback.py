@@ -83,15 +83,6 @@ def test_downhill_it_saves_energy_and_keeps_the_torso_upright(plan: Plan) -> Non
 
 
 @pytest.mark.slow
-def test_the_same_seed_gives_the_same_walk_and_noise_and_delay_act(step: Plan) -> None:
-    first, again = simulate(step, Feedback()), simulate.__wrapped__(step, Feedback())
-    np.testing.assert_array_equal(first.q, again.q)
-    others = (replace(Feedback(), seed=1), NOISELESS, replace(Feedback(), delay_s=0.02))
-    for other in others:
-        assert np.abs(simulate(step, other).q[: len(first.q)] - first.q).max() > 1e-5
-
-
-@pytest.mark.slow
 def test_the_load_passes_from_foot_to_foot(plan: Plan) -> None:
     """In single support one foot has it all; in between, the point that divides their distance is nearest to the ZMP."""
     single, double, period = 0.4, 0.56565, 0.96565
@@ -147,16 +138,6 @@ def virtual_work(plan: Plan, foot: str, force: Array, at: Array) -> Array:
     place = poses[torso].position - poses[torso].rotation @ DM(joint.origin_m)
     slopes = ca.Function("slopes", [q], [ca.gradient(DM(force).T @ place, q)])
     return np.asarray(slopes(at)).ravel()
-
-
-def test_weaker_servos_are_weaker(plan: Plan) -> None:
-    drive = Drive()
-    (as_assumed, _), (weak, _) = (
-        prepare(plan, Conditions(stiffness_factor=factor), drive, "rectangle") for factor in (1.0, 0.7)
-    )
-    np.testing.assert_allclose(weak.actuator_gainprm[:, 0], 0.7 * as_assumed.actuator_gainprm[:, 0])
-    np.testing.assert_allclose(weak.actuator_biasprm[:, 1], 0.7 * as_assumed.actuator_biasprm[:, 1])
-    np.testing.assert_array_equal(weak.actuator_biasprm[:, 2], as_assumed.actuator_biasprm[:, 2])
 
 
 @pytest.mark.parametrize(("name", "value"), [("period_s", 0.0), ("delay_s", -0.01), ("spring", float("nan"))])

@@ -70,12 +70,6 @@ def test_the_engine_reads_our_masses_to_the_last_digit():
     assert model.opt.gravity.tolist() == [0.0, 0.0, -9.8]
 
 
-def test_slope_tilts_gravity():
-    down = np.array(Conditions(slope_rad=(0.1, 0.0)).gravity(9.8))
-    assert np.linalg.norm(down) == pytest.approx(9.8)
-    assert np.arctan2(-down[0], -down[2]) == pytest.approx(0.1) and down[1] == 0.0
-
-
 def test_without_the_extra_one_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'nlp-gait\[sim\]'"):

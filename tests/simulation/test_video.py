@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from nlp_gait.errors import InputError, OutputError
+from nlp_gait.errors import InputError
 from nlp_gait.simulation.video import check_video_path, write_video
 
 
@@ -30,8 +30,3 @@ def test_a_gif_keeps_frames_size_pace_and_colours(tmp_path):
 def test_other_endings_are_refused():
     with pytest.raises(InputError, match="must end in .gif, got 'walk.avi'"):
         check_video_path(Path("walk.avi"))
-
-
-def test_an_unwritable_video_is_an_output_error(tmp_path):
-    with pytest.raises(OutputError, match="cannot write"):
-        write_video(tmp_path / "no" / "walk.gif", frames(), 10.0)

@@ -52,13 +52,6 @@ def test_point_masses_in_level_motion(static_load: bool) -> None:
     assert numbers(zmp_of_point_masses(*points(), 10.0, static_load=static_load)) == pytest.approx([2.85, 0.1])
 
 
-def test_point_masses_that_rise_load_the_ground_more() -> None:
-    """The first with 5 m/s^2: x as before over 45, y = (15 - 6) / 45; by the weight alone over 40."""
-    moving = points((5.0, 0.0))
-    assert numbers(zmp_of_point_masses(*moving, 10.0)) == pytest.approx([114 / 45, 9 / 45])
-    assert numbers(zmp_of_point_masses(*moving, 10.0, static_load=True)) == pytest.approx([114 / 40, 9 / 40])
-
-
 def test_the_load_of_point_masses_in_free_fall_is_a_share_of_their_weight() -> None:
     falling = points((-10.0, -10.0))
     expected = np.array([-6.0, -6.0]) / (LEAST_LOAD * 40.0)

@@ -98,19 +98,6 @@ def test_a_stretched_knee_has_a_steep_and_finite_slope_when_exact() -> None:
         assert [float(v) for v in acos(Exact())(c * (1 + 1e-15))[1:]] == [0.0, 0.0]
 
 
-def test_without_a_margin_the_tangent_begins_a_millionth_before_the_stretched_leg() -> None:
-    ops = Lifted(MX(1e-3))
-    assert float(acos(ops, 0.0)(1 - 1.5e-6)[2]) < -1e8  # still an arc cosine
-    assert float(acos(ops, 0.0)(1 - 0.5e-6)[2]) == 0.0
-
-
-@given(switch=reals, below=reals, above=reals)
-def test_an_exact_step_takes_one_of_its_branches(switch: float, below: float, above: float) -> None:
-    got = value(Exact().step(MX(switch), MX(below), MX(above)))[0]
-    expected = above if switch >= 0 else below
-    assert got == pytest.approx(expected, abs=1e-9)  # below + (above - below), with values of up to a million
-
-
 @given(v=st.lists(reals, min_size=1, max_size=9))
 def test_the_largest_of_a_vector_is_found_at_every_place(v: list[float]) -> None:
     column, largest = MX(ca.DM(v)), max(map(abs, v))

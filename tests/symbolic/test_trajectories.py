@@ -50,11 +50,6 @@ def test_the_swing_foot_starts_and_lands_at_zero_height_and_peaks_halfway() -> N
         assert lift[:2] == pytest.approx([height, velocity], abs=TOLERANCE)
 
 
-def test_the_lift_is_a_parabola_over_the_path_not_over_time() -> None:
-    along, lift = _lift(0.2)
-    assert lift[0] == pytest.approx(0.02 * (1 - ((along[0] - 0.06) / 0.06) ** 2), abs=TOLERANCE)
-
-
 def test_derivatives_of_the_lift_are_those_of_its_height() -> None:
     step, duration = 1e-5, 4.0  # [-]; central differences err by 1e-9 here
     for phase in (0.1, 0.37, 0.8):
@@ -68,12 +63,6 @@ def test_what_stands_still_has_no_derivatives_and_costs_nothing() -> None:
     assert [float(v) for v in ca.vertsplit(motion.position)] == [1.5, -2.0]
     assert motion.velocity.is_zero()
     assert motion.acceleration.is_zero()
-
-
-def test_a_path_off_the_origin_is_lifted_between_its_own_ends() -> None:
-    """From 1 to 3, at 1.5 with rate 2 and bend 4: offset -1/2, rate 2, bend 4 in halves of the path."""
-    lift = parabola_lift(Motion(SX(1.5), SX(2.0), SX(4.0)), 1.0, 3.0, SX(0.1))
-    assert [float(part) for part in lift] == pytest.approx([0.1 * 0.75, 0.1 * 2.0, -0.2 * (4.0 - 2.0)], abs=TOLERANCE)
 
 
 def test_a_function_of_a_motion_by_the_chain_rule() -> None:
