@@ -1,6 +1,5 @@
 """Limits that a user adds: every one on every kind of phase, and against values by hand and MuJoCo."""
 
-import json
 import pickle
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +15,6 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.errors import GaitError
 from nlp_gait.formulation import GaitProblem, Grid, Result
-from nlp_gait.formulation.result import load_result
 from nlp_gait.limits import FootClearance, FrictionCone, Limit, Point, Samples
 from nlp_gait.proofs.guarantee import guarantee
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -239,13 +237,6 @@ def test_unknown_limits_are_refused(limits: str, message: str) -> None:
         nlp_gait.load("nao-ssp", limits=limits)
 
 
-def test_objects_that_are_no_limits_are_refused() -> None:
-    with pytest.raises(GaitError, match="FrictionCone()"):
-        nlp_gait.load("nao-ssp").with_limits(single_support=[FrictionCone])  # type: ignore[list-item]
-    with pytest.raises(GaitError, match="takes no limits"):
-        nlp_gait.load("walk12").with_limits(single_support=[FrictionCone()])
-
-
 def test_a_limit_that_reads_what_a_motion_lacks_is_refused() -> None:
     class Unknown(Limit):
         def add(self, at: Point, samples: Samples, ops: Any) -> Any:
@@ -254,13 +245,3 @@ def test_a_limit_that_reads_what_a_motion_lacks_is_refused() -> None:
     problem = nlp_gait.load("nao-ssp").with_limits(single_support=[Unknown()])
     with pytest.raises(GaitError, match="temperature"):
         build_exact_model(problem)
-
-
-def test_a_stored_gait_runs_no_limit_that_was_not_named(tmp_path: Path) -> None:
-    code = tmp_path / "evil.py"
-    code.write_text("raise SystemExit('ran')")
-    x = dict(zip(nlp_gait.load("nao-ssp").names, OPTIMUM, strict=True))
-    file = tmp_path / "gait.json"
-    file.write_text(json.dumps({"problem": "nao-ssp", "options": {"limits": f"{code}:Limit"}, "x": x}))
-    with pytest.raises(GaitError, match="--code"):
-        load_result(file)

@@ -79,11 +79,6 @@ def test_numbers_agree_to_rounding_only() -> None:
             assert bool(describe_difference(known, changed)) == differs
 
 
-def test_a_default_value_is_not_a_change() -> None:
-    walk = load("walk12")
-    assert identify_problem(walk.with_values(step_time_s=walk.value("step_time_s"))) == identify_problem(walk)
-
-
 def test_user_code_keeps_its_identity_when_a_comment_or_a_name_inside_changes(tmp_path: Path) -> None:
     path = tmp_path / "own.py"
     found = []

@@ -24,12 +24,10 @@ from compare.questions import robust_gait, sweep, variants
 from compare.study.record import read_record
 from compare.study.store import Computation
 from nlp_gait.backends.kernel.compiled import CompiledObjective
-from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.backends.solvers.solver import IterationWatch
 from nlp_gait.interrupts import (
     Interrupted,
 )
-from tests.backends.toys import corner, toy
 from tests.compare.records import DSP_X
 from tests.faults.processes import ROOT, start, wait_for
 
@@ -118,15 +116,6 @@ def test_a_question_writes_what_it_has_or_counts_what_is_stored(
     else:
         assert int(match[1]) == len(list(tmp_path.glob("store/*.json"))) >= 1
         assert [path.name for path in tmp_path.iterdir()] == ["store"]
-
-
-def test_a_path_carries_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
-    problems = [toy(corner).with_values(limit=limit) for limit in (0.5, 0.6, 0.7)]
-    press_after(monkeypatch, IterationWatch, "eval", 1)
-    with pytest.raises(Interrupted, match="interrupted after 1 of 3 points") as caught:
-        solve_both_ways(problems, starts=1)
-    assert isinstance(caught.value.partial, list)
-    assert [solution is None for solution in caught.value.partial] == [False, True, True]
 
 
 @pytest.mark.slow

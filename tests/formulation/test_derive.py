@@ -68,12 +68,6 @@ def test_a_changed_problem_has_its_own_functions(how: str) -> None:
     assert f[0] == pytest.approx(5.0)
 
 
-def test_derivations_can_be_chained() -> None:
-    once = built(toy(corner).derive(change=doubled))
-    twice = once.derive(change=doubled)
-    assert [evaluated(problem, [1.5, 0.0]).cost for problem in (once, twice)] == [5.0, 10.0]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle", "walk12", "stairs-plan", "stairs-track"])
 def test_time_histories_are_those_of_the_base_problem(name: str) -> None:
@@ -85,11 +79,6 @@ def test_time_histories_are_those_of_the_base_problem(name: str) -> None:
     assert before.arrays.keys() == after.arrays.keys()
     for key, values in before.arrays.items():
         np.testing.assert_array_equal(after.arrays[key], values, err_msg=key)
-
-
-def test_time_histories_follow_changed_values(walk: GaitProblem) -> None:
-    slower = with_slack(walk).with_values(step_time_s=2.0 * walk.value("step_time_s"))
-    assert slower.signals([*WALK_X, 0.5]).arrays["t"][-1] == 2.0 * walk.signals(WALK_X).arrays["t"][-1]
 
 
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle", pytest.param("stairs-ideal", marks=pytest.mark.slow)])
@@ -127,14 +116,6 @@ def test_the_compiled_objective_and_the_judge_see_it(walk: GaitProblem) -> None:
     assert violation[0] - violation[1] == pytest.approx((LEAST_SLACK - 0.1) / 0.1)
     assert verdicts[0].problem == "dearer" and "least_slack" in [row.name for row in verdicts[0].violations]
     assert verdicts[0].dense is not None
-
-
-def test_ipopt_solves_it() -> None:
-    """The slack costs, so that the least that is allowed is best; the rest is the problem below."""
-    solution = nlp_gait.solve(with_slack(toy(corner, limit=2.0)), starts=2)
-    assert solution.converged
-    assert solution.x == pytest.approx({"x": 2.0, "y": 2.0, "slack_m": LEAST_SLACK}, abs=1e-6)
-    assert solution.objective == pytest.approx(3.0 + 2.0 * LEAST_SLACK, abs=1e-6)
 
 
 def test_another_objective_has_its_own_name_and_sense() -> None:

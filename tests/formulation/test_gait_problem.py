@@ -67,11 +67,6 @@ def test_values_that_are_not_allowed_are_refused(values: dict[str, Any], message
         toy(corner).with_values(**values)
 
 
-def test_both_ends_of_a_range_may_move_at_once() -> None:
-    moved = toy(corner).with_values(**{"x.lower": 3.0, "x.upper": 4.0})
-    assert (moved.lower[0], moved.upper[0]) == (3.0, 4.0)
-
-
 def test_unknown_names_get_the_nearest_ones() -> None:
     problem = load("nao-ssp")
     with pytest.raises(UnknownNameError, match=r"unknown problem 'nao-sp'; did you mean .*'nao-ssp'"):
@@ -111,14 +106,6 @@ def test_invalid_points_are_refused(x: Any, message: str) -> None:
     for read in (toy(corner).check_x, toy(corner).at):
         with pytest.raises(InputError, match=message):
             read(x)
-
-
-def test_start_points_lie_within_the_current_bounds() -> None:
-    problem = load("nao-ssp").with_values(**{"hip_height_m.lower": 0.30})
-    points = np.array([problem.start_point(np.random.default_rng(seed)) for seed in range(20)])
-    assert (points >= problem.lower).all()
-    assert (points <= problem.upper).all()
-    assert np.ptp(points, axis=0).min() > 0
 
 
 def test_parameter_arrays_cannot_be_written() -> None:

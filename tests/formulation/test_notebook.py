@@ -1,6 +1,5 @@
 """Display of results: one line in a terminal, a small table in a notebook, data frames, and the balance margin."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from compare.study.record import HEADER, RunRecord, make_frame
 from compare.study.record_files import write_record
 from compare.study.run_study import Study
 from compare.study.task import ProblemSpec, Task
-from nlp_gait.errors import InputError, MissingExtraError, UnknownNameError
+from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Columns, Signals
 from nlp_gait.formulation.display import Skeleton, Sole, make_rectangle
 from tests.compare.records import record
@@ -46,12 +45,6 @@ def test_time_histories_by_name_and_as_a_data_frame(signals: Signals) -> None:
     assert frame["tau hip"][0.5] == 2.0
     assert repr(signals) == "<Signals over 1 s in 3 samples: tau, share, t>"
     assert "&lt;knee&gt;" in signals._repr_html_() and "<knee>" not in signals._repr_html_()
-
-
-def test_without_pandas_the_message_says_how_to_install_it(signals: Signals, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(MissingExtraError, match="pip install pandas"):
-        signals.to_frame()
 
 
 def test_a_solution_with_many_prices_displays_twenty(solution: nlp_gait.Solution) -> None:

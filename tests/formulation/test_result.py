@@ -86,11 +86,6 @@ def test_keys_that_are_not_needed_are_ignored_and_misspelled_ones_are_not(tmp_pa
         load_result(written(tmp_path, stated | {"option": {}}))
 
 
-def test_an_absent_file_is_refused(tmp_path):
-    with pytest.raises(InputError, match="cannot be read: No such file"):
-        load_result(tmp_path / "absent.json")
-
-
 @pytest.mark.parametrize(("period", "samples"), [(0.2, 11), (0.1, 21), (0.15, 21), (10.0, 11)])
 def test_sampling_keeps_the_problems_samples(tmp_path, period, samples):
     result = load_result(written(tmp_path, {"problem": "nao-dsp", "x": X}))

@@ -17,7 +17,7 @@ from nlp_gait.errors import GaitError, InputError, UnknownNameError, UserCodeErr
 from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Parameter, Variable
 from nlp_gait.formulation.registry import check_mathematics
 from nlp_gait.formulation.result import load_result
-from nlp_gait.user_code import hash_source, is_reference
+from nlp_gait.user_code import hash_source
 from tests.backends.toys import corner, toy
 from tests.robots.custom import humanoid
 
@@ -217,11 +217,6 @@ def test_a_source_is_the_file_and_the_files_next_to_it_that_it_imports(tmp_path:
     changed = {hash_with(**{name: f"{content}edited = True\n"}) for name, content in files.items()}
     assert len(changed) == 4 and before not in changed
     assert hash_with(**{"own.py": f"{text}def"}) not in changed  # also where it cannot be parsed
-
-
-def test_references_have_a_form() -> None:
-    assert all(map(is_reference, ("own.py:leg", "a/b c.py:leg", "pkg.mod:leg")))
-    assert not any(map(is_reference, ("nao-ssp", "a b:leg", "own.py:")))
 
 
 def test_a_source_of_five_megabytes_is_refused(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.plan_walk import MARGINS, WalkPlan, WalkSettings, describe_violation, plan_climb, plan_walk
+from nlp_gait.backends.plan_walk import MARGINS, WalkPlan, WalkSettings, describe_violation, plan_walk
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.formulation.solution import ConstraintValue
@@ -234,16 +234,3 @@ def test_every_step_climbs_one_tread_and_clears_its_edge(climb: GaitProblem) -> 
         assert all((plan.level(end) < arrays[side][:, 2] + 1e-9).all() for end in ends)
     landed = plan.stands("left", arrays["t"]) + plan.stands("right", arrays["t"])
     assert landed.min() >= 1.0
-
-
-@pytest.mark.parametrize(
-    ("stairs", "words"),
-    [
-        ("0.02x0.18:3", "the run of stairs must be at least 0.165 m, .* at most 0.122 m, the longest step"),
-        ("0x0.1:3", "the rise of stairs must be a finite number > 0"),
-        ("0.02:3", "stairs must be RISExRUN:N"),
-    ],
-)
-def test_stairs_that_cannot_be_climbed_are_refused(stairs: str, words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        plan_climb("nao-v5", stairs)

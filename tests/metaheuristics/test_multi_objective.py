@@ -38,13 +38,6 @@ def test_fronts_are_feasible_near_the_true_one_and_repeat_with_their_seed(name: 
     np.testing.assert_array_equal(second.F, again.F)
 
 
-def test_a_later_budget_does_not_change_an_earlier_snapshot() -> None:
-    algorithm = make_front_algorithm("NSGA2", population=20)
-    alone = minimize_many(TwoParabolas(), algorithm, evaluations=(200,), seed=0)[0]
-    first = minimize_many(TwoParabolas(), algorithm, evaluations=(200, 400), seed=0)[0]
-    np.testing.assert_array_equal(alone.X, first.X)
-
-
 def test_without_a_feasible_point_the_front_is_empty() -> None:
     class Infeasible(TwoParabolas):
         def __call__(self, X: Array) -> tuple[Array, Array]:

@@ -13,7 +13,6 @@ from metaheuristics import (
     ALGORITHMS,
     AntColony,
     AntColonyGrid,
-    Deb,
     EpsilonLevel,
     Flip,
     GeneticAlgorithm,
@@ -95,11 +94,6 @@ def test_lookup_by_name(name: str) -> None:
     algorithm = make_algorithm(name, population=12)
     assert (algorithm.name, algorithm.population) == (name, 12)
     assert algorithm == {**ALGORITHMS, **ADAPTERS}[name](population=12)
-
-
-def test_handlings_by_name() -> None:
-    assert make_handling("deb") == Deb() and make_handling("epsilon", control=0.5) == EpsilonLevel(control=0.5)
-    assert make_handling("penalty", weight=3.0) == StaticPenalty(weight=3.0)
 
 
 @pytest.mark.parametrize(

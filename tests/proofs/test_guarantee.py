@@ -182,12 +182,6 @@ def test_finite_differences_are_sampled_by_definition() -> None:
     assert found.satisfied is None and "on samples only" in found.reason and found.word == "?"
 
 
-def test_a_change_of_the_mathematics_takes_the_guarantee_away_and_new_values_do_not() -> None:
-    problem = nlp_gait.load("walk12")
-    assert problem.with_values(step_time_s=0.9).rows_over_time
-    assert not problem.derive(change=lambda assembly, point, ops: assembly).rows_over_time
-
-
 def test_without_a_compiler_the_verdict_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     def missing() -> None:
         raise CompilerError("no C++ compiler")

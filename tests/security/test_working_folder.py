@@ -1,14 +1,12 @@
 """Python files in the working folder never run, whatever module they are called after."""
 
 import importlib
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from nlp_gait.processes import OWN_VALUE, VARIABLE, hide_working_folder, show_working_folder
 from tests.faults.processes import ROOT
 
 LOADED = (
@@ -46,15 +44,3 @@ def test_no_file_of_the_working_folder_runs(tmp_path: Path) -> None:
         done = subprocess.run(command, cwd=bait, capture_output=True, text=True, timeout=120)
         assert done.returncode == 0, done.stderr
     assert not list(tmp_path.glob("ran-*"))
-
-
-def test_programs_of_user_code_find_their_modules(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(VARIABLE, raising=False)
-    hide_working_folder()
-    assert os.environ[VARIABLE] == OWN_VALUE
-    show_working_folder()
-    assert VARIABLE not in os.environ
-    monkeypatch.setenv(VARIABLE, "1")  # the user's own choice stays
-    hide_working_folder()
-    show_working_folder()
-    assert os.environ[VARIABLE] == "1"

@@ -82,15 +82,6 @@ def test_a_link_in_place_of_a_library_is_not_followed(cache: Path, compiler: Com
     assert elsewhere.exists() and not path.is_symlink()
 
 
-def test_source_and_flags_make_the_key(cache: Path, compiler: Compiler) -> None:
-    paths = {
-        load_library(source, compiler, flags, ())[1]
-        for source in (SOURCE, SOURCE + "\n")
-        for flags in (FLAGS, ("-O1",))
-    }
-    assert len(paths) == 4
-
-
 def test_a_cache_that_cannot_be_made_or_trusted(
     cache: Path, compiler: Compiler, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

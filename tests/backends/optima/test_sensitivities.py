@@ -76,17 +76,6 @@ def test_a_maximised_objective_keeps_its_sign() -> None:
     np.testing.assert_allclose(answer.x[:, 0], [1.0, -0.5], atol=1e-8)
 
 
-def test_rows_that_say_the_same_are_counted_and_harmless() -> None:
-    def twice(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
-        return x**2 + y**2, (row(x, lower=limit), row(2 * x, lower=2 * limit))
-
-    at = found(toy(twice))
-    answer = differentiate_by_parameters(at)
-    assert at.dependent == 1
-    assert answer.defined.all()
-    assert answer.objective[0] == pytest.approx(1.0, abs=1e-7)
-
-
 def test_rows_that_part_when_the_limit_moves_have_no_derivative() -> None:
     def contrary(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
         return x**2 + y**2, (row(x, lower=limit), row(x, lower=1 - limit))

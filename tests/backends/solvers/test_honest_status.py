@@ -46,13 +46,6 @@ def test_contradicting_limits_are_called_local_infeasibility() -> None:
     )
 
 
-def test_too_many_equations_are_called_that(capfd: pytest.CaptureFixture[str]) -> None:
-    rows = [lambda x, y: x + y, lambda x, y: x - y, lambda x, y: x * y]
-    problem = toy(lambda x, y, limit, ops: (x**2, tuple(row(f(x, y), limit, limit) for f in rows)))
-    assert "not enough degrees of freedom" in solve(problem).status
-    assert "3 equality constraints but only 2 variables" in "".join(capfd.readouterr())
-
-
 @pytest.mark.parametrize(
     ("mathematics", "objective"),
     [
@@ -151,11 +144,3 @@ def test_options_that_lie_in_the_working_folder_change_nothing(
     assert solution.best.linear_solver == expected.best.linear_solver
     assert [path.name for path in tmp_path.iterdir()] == ["ipopt.opt"]
     assert "".join(capfd.readouterr()) == ""
-
-
-def test_the_linear_solver_is_the_one_that_ipopt_names(capfd: pytest.CaptureFixture[str]) -> None:
-    x = MX.sym("x")
-    ca.nlpsol("loud", "ipopt", {"x": x, "f": x**2}, {"ipopt.option_file_name": ""})(x0=1.0)
-    banner = capfd.readouterr().out
-    assert f"running with linear solver {find_linear_solver()}" in banner
-    assert IpoptSettings().prepare(toy(corner)).linear_solver == find_linear_solver()

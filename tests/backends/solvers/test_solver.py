@@ -90,18 +90,6 @@ def test_an_iteration_of_a_large_problem_that_does_not_end_is_killed(presses: bo
 
 
 @pytest.mark.slow
-def test_the_limit_is_for_all_stages_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A balance margin that jumps takes several stages; the time of the first counts for the second."""
-    problem = nlp_gait.load("nao-ssp")
-    whole = nlp_gait.solve(problem)
-    clock = iter(range(10_000))
-    monkeypatch.setattr(solver_module.time, "perf_counter", lambda: float(next(clock)))
-    solution = nlp_gait.solve(problem, solver=IpoptSettings(time_limit_s=whole.best.iterations - 3.0))
-    assert solution.starts[0].status == "stopped at the time limit"
-    assert 0 < solution.best.iterations < whole.best.iterations
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sqpmethod", "uno"])
 def test_other_solvers_heed_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if nlpsol.probe(name) is not None:

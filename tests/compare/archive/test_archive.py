@@ -20,7 +20,7 @@ from compare.study.task import ProblemSpec, Stop
 from nlp_gait.errors import InputError, UserCodeError
 from nlp_gait.proofs.certificate import load_certificates
 from nlp_gait.user_code import allow_code
-from tests.compare.archive.forged_archives import Files, damage, edit, forge, sign, write_zip
+from tests.compare.archive.forged_archives import Files, damage, forge, sign, write_zip
 from tests.robots.crooked import crooked, crooked_urdf
 from tests.robots.test_mjcf import plain_urdf
 
@@ -85,21 +85,6 @@ def test_every_forgery_with_a_fitting_manifest_is_named(files: Files, tmp_path: 
     for k, (name, content, word) in enumerate(forge(files, find_record(files))):
         wrong = [finding.sentence for finding in verify(content, tmp_path / str(k)) if finding.holds is False]
         assert len(wrong) == 1 and word in wrong[0], (name, wrong)
-
-
-@pytest.mark.slow
-def test_a_forged_course_is_found_by_repeating_the_run(files: Files, tmp_path: Path) -> None:
-    """Nothing else can tell that a search was faster than it was."""
-
-    def hurry(record: dict) -> None:
-        objective = record["history"]["objective"]
-        objective[:] = objective[-1:] * len(objective)
-
-    content = write_zip(edit(files, find_record(files), hurry))
-    assert not any(f.holds is False for f in verify(content, tmp_path / "a", share=0.0))
-    wrong = [f.sentence for f in verify(content, tmp_path / "b", share=1.0) if f.holds is False]
-    forged = [sentence for sentence in wrong if sentence.startswith("repeated: walk, pso, run 1:")]
-    assert len(forged) == 1 and "its history differs" in forged[0] and len(wrong) == 1
 
 
 TETRAHEDRON = "v -0.05 -0.05 0\nv 0.15 0 0\nv -0.05 0.05 0\nv 0 0 0.05\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"

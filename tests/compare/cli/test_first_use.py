@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -75,16 +74,6 @@ def test_the_python_of_the_readme_runs_as_pasted():
     found: dict[str, object] = {}
     exec(code.replace("starts=20", "starts=1").replace("10_000", "500"), found)  # noqa: S102
     assert found["optimum"].converged and found["result"].objective >= found["optimum"].objective
-
-
-def test_a_problem_by_name_a_solution_in_one_line_and_its_x_wherever_one_is_taken():
-    solution = nlp_gait.solve("nao-dsp", starts=1)
-    assert len(repr(solution)) < 120 and "power 0.531886 W; 1 of 1 starts" in repr(solution)
-    problem = nlp_gait.load("nao-dsp")
-    power, violation = nlp_gait.compile_objective(problem)(solution.x)
-    np.testing.assert_allclose(power, [solution.objective])
-    assert violation[0] < 1e-6
-    assert nlp_gait.solve(problem, x0=solution.x).best.iterations < 30
 
 
 def test_long_work_leaves_a_line_in_a_log_now_and_then(monkeypatch, capsys):

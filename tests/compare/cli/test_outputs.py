@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 from compare.__main__ import fix_environment
 from compare.cli import app
 from nlp_gait import __version__, load
-from nlp_gait.errors import GaitError, OutputError
-from nlp_gait.files import protect_inputs, write_text
+from nlp_gait.errors import OutputError
+from nlp_gait.files import write_text
 from tests.compare.cli.calls import nlp_gait, one_sentence
 from tests.faults.processes import ROOT, in_own_mounts
 from tests.robots.custom import humanoid
@@ -99,15 +99,6 @@ def test_files_that_a_robot_refers_to_stay(ending: str, folder: Path) -> None:
                 write_text(folder / name, mesh)
 
 
-def test_the_next_command_may_write_the_file(folder: Path) -> None:
-    protect_inputs([folder / "w.json"])
-    with pytest.raises(OutputError, match="this command reads it"):
-        write_text(folder / "w.json", "")
-    nlp_gait("evaluate", "walk12", "--x", "p.csv", "--csv", "w.json", "--force")
-    protect_inputs([])
-    write_text(folder / "w.json", "")
-
-
 PRINTS = "print(chr(0x202f))"
 BREAKS = "(_ for _ in ()).throw(BrokenPipeError(32, ''))"
 
@@ -154,16 +145,6 @@ def test_a_name_that_is_not_text_is_refused_before_the_work(arguments: str, tmp_
     error = one_sentence(*arguments.split(), os.fsdecode(bytes(tmp_path / "f") + b"\xff"))
     assert "its name is not valid UTF-8; choose another name" in error
     assert list(tmp_path.iterdir()) == []
-
-
-def test_robots_and_code_that_no_record_could_name_are_refused(tmp_path: Path) -> None:
-    folder = tmp_path / os.fsdecode(b"f\xff")
-    folder.mkdir()
-    (folder / "mine.json").write_text('{"schema": 1, "name": "mine", "extends": "nao-v5"}')
-    (folder / "own.py").write_text("from nlp_gait import load\nwalk = load('walk12')\n")
-    for problem, options in (("nao-dsp", {"robot": f"{folder}/mine.json"}), (f"{folder}/own.py:walk", {})):
-        with pytest.raises(GaitError, match="not valid UTF-8; choose another name"):
-            load(problem, **options)
 
 
 @pytest.mark.slow

@@ -4,10 +4,6 @@ import json
 import math
 from pathlib import Path
 
-import pytest
-
-from compare.cli.printing import print_output
-from compare.cli.questions import write_answer
 from compare.questions.question import Answer, make_optima_table, make_record_table
 
 ANSWER = Answer(
@@ -42,11 +38,3 @@ def test_an_answer_is_a_page_a_table_with_every_digit_and_plain_data(tmp_path: P
     page = (tmp_path / "walk-question.md").read_text()
     assert page.startswith("**One third is enough.**\n\n# walk: the question") and "0.333333 | yes | -" in page
     assert "One third is enough." in (tmp_path / "walk-question.html").read_text()
-
-
-def test_sentences_and_tables_for_people_are_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    print_output(write_answer(ANSWER, tmp_path), as_json=False)
-    printed = capsys.readouterr().out
-    for words in ("walk: the question", "One third is enough.", "A note.", "0.33333", "wrote "):
-        assert words in printed
-    assert "price" not in printed

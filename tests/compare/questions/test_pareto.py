@@ -7,7 +7,7 @@ import nlp_gait
 from compare.judge import evaluate
 from compare.questions.pareto.competing import MARGINS, make_competing_objective
 from compare.questions.pareto.front import FrontPoint, find_knees, select_front, solve_front
-from compare.questions.pareto.pareto import Pareto, SearchFront, compute_qualities, parse_searches
+from compare.questions.pareto.pareto import Pareto, SearchFront, compute_qualities
 from compare.questions.question import find
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem
@@ -77,13 +77,6 @@ def test_prices_are_the_fronts_slopes() -> None:
         assert below.objective < here.objective < above.objective
         slope = (above.objective - below.objective) / (2 * step)
         assert criterion.compute_price(here) == pytest.approx(slope, rel=SLOPE_TOLERANCE)
-
-
-def test_searches_are_parsed() -> None:
-    assert parse_searches(["none"]) == {}
-    assert parse_searches(["NSGA2=100,200"]) == {"NSGA2": (100, 200)}
-    with pytest.raises(InputError, match="--search takes"):
-        parse_searches(["NSGA2"])
 
 
 def test_what_cannot_be_traded_is_refused() -> None:

@@ -66,15 +66,6 @@ def test_optima_stand_next_to_the_shipped_values_of_their_settings() -> None:
     assert [row[-1] for row in table.rows] == ["-", "0.922228 (shipped, proven to six digits)"]
 
 
-def test_another_nlp_solver_walks_the_grid_too() -> None:
-    axes = [Axis(name="swing_height_m", values=(0.015, 0.018))]
-    calls: list[str] = []
-    question = Sweep(problem=load("nao-ssp"), axes=axes, algorithm="slsqp", starts=1)
-    points = find(question, Work(progress=calls.append))
-    assert len(calls) == question.total == 4
-    assert [p.objective for p in points] == pytest.approx([SWING_W[0.015], SWING_W[0.018]], abs=AGREEMENT_W)
-
-
 def test_grid_of_two_axes_over_a_search() -> None:
     axes = [Axis(name="hip_height_m", values=(0.3, 0.31)), Axis(name="heat_loss_W_per_Nm2", values=(0.02, 0.03))]
     calls: list[str] = []

@@ -69,12 +69,6 @@ def test_the_table_and_the_results_can_be_read_back(question: Sweep, points: lis
         assert result.problem.by_name(result.x) == point.x
 
 
-def test_nothing_is_drawn_of_cycles_without_a_gait(question: Sweep, points: list[SweepPoint]) -> None:
-    infeasible = [replace(point, feasible=False) for point in points]
-    figures = [part.name for part in question.report(infeasible).parts if isinstance(part, Figure)]
-    assert figures == ["nao-cycle-sweep-speed_m_s-ipopt"]
-
-
 def test_only_walking_cycles_are_simulated() -> None:
     with pytest.raises(InputError, match="steps of walking cycles, such as nao-cycle; 'nao-ssp' is not one"):
         Sweep(problem=load("nao-ssp"), axes=[parse_axis("swing_height_m=0.02")], steps=2)

@@ -20,7 +20,6 @@ from compare.questions.variants import (
 )
 from nlp_gait import load
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
@@ -86,17 +85,6 @@ def test_free_joints_of_single_support_do_not_contain_a_plan() -> None:
     assert question._has_curves(load_variant(phase, free), free)
 
 
-def test_lists_of_trajectories() -> None:
-    variants = list_trajectories(load("nao-ssp"))
-    assert [(v.problem, v.options["trajectory"], v.options["samples_per_interval"]) for v in variants] == [
-        *(("", order, 4) for order in ("cubic", "quintic", "spline-2", "spline-4", "spline-8")),
-        ("", "spline-8", 1),
-        *(("", "spline-4", 4),) * 2,
-        *(("nao-ssp-free", order, 8) for order in ("spline-2", "spline-4", "spline-8", "spline-16")),
-    ]
-    assert [v.alone for v in variants] == [False] * 5 + [True] * 7
-
-
 def test_the_command_reports_what_each_feature_of_the_motors_changes(tmp_path: Path) -> None:
     named = ["--variant", "limits:motors=limits", "--variant", "K:motors=limits,ankle,heat"]
     answer = run("nao-dsp", *named, "--starts", "1", "--out", str(tmp_path))
@@ -116,8 +104,3 @@ def test_values_of_an_option_of_any_problem(tmp_path: Path) -> None:
     short, long = answer["variants"]
     assert short["options"] == {"step_length_m": 0.05} and short["objective"] < long["objective"]
     assert np.isfinite(short["moved"])
-
-
-def test_variants_need_names(problem: GaitProblem) -> None:
-    with pytest.raises(InputError, match="at least one"):
-        Variants(problem=problem, variants=())

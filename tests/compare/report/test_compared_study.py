@@ -7,7 +7,7 @@ import pytest
 import nlp_gait
 from compare.report.compared_study import ComparedStudy
 from metaheuristics import ParticleSwarm
-from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.errors import UnknownNameError
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +37,3 @@ def test_tables_for_papers_show_different_digits_gaps_and_marks(study: ComparedS
     assert "& small swarm" in overview and r"$+$/$-$/$=$" in overview and "mean rank & 1.00" in overview
     rows = [line.split(" & ") for line in study.latex(decimals=7).splitlines() if line.startswith("ipopt")]
     assert rows[0][3].startswith("0.53188") and len(rows[0][2]) == 9
-
-
-def test_what_cannot_run_is_refused() -> None:
-    with pytest.raises(InputError, match="runs must be at least 1"):
-        nlp_gait.compare("nao-dsp", runs=0)

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-from compare.analysis.live_gaps import LiveGaps
 from compare.report import watch_report, write_report
 from compare.study.record import RunRecord
 from compare.study.record_files import name_run
@@ -51,10 +50,3 @@ def test_a_running_study_says_how_many_runs_have_ended(tmp_path: Path) -> None:
     assert "3 of 4 runs have ended" in (tmp_path / "report.html").read_text()
     write_report(tmp_path, records, replace(manifest, runs=(*planned, *others)))
     assert "runs have ended" not in (tmp_path / "report.html").read_text()
-
-
-def test_gaps_are_reported_while_runs_end() -> None:
-    """Without a known value the best run so far is the reference: 0.8, then 0.5."""
-    gaps = LiveGaps()
-    lines = [gaps.add(one) for one in make_study(a=[0.8, 0.9], b=[0.5])]
-    assert lines == ["walk: a 0.0000 % (1)", "walk: a 6.2500 % (2)", "walk: b 0.0000 % (1), a 70.0000 % (2)"]

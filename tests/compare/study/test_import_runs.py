@@ -96,15 +96,6 @@ def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
     np.testing.assert_array_equal(points, POINTS)
 
 
-def test_a_file_that_grows_keeps_the_rows_that_it_had(tmp_path: Path) -> None:
-    write_records(import_runs(WALK, finals(tmp_path), "ga", evaluations=100), tmp_path)
-    before = read_records(tmp_path)
-    (tmp_path / "finals.csv").write_text((tmp_path / "finals.csv").read_text() + ",".join(map(str, POINTS[0])) + "\n")
-    write_records(import_runs(WALK, tmp_path / "finals.csv", "ga", evaluations=100), tmp_path)
-    assert [r.inputs for r in read_records(tmp_path)][:3] == [r.inputs for r in before]
-    assert len(read_records(tmp_path)) == 4
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [

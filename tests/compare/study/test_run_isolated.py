@@ -48,11 +48,6 @@ def test_a_run_has_its_own_process_and_session_and_no_output(task: Task, capfd: 
     assert capfd.readouterr() == ("", "")
 
 
-def test_without_a_time_limit_it_is_waited_for(task: Task) -> None:
-    endless = replace(task, stop=Stop(evaluations=20))
-    assert status(endless, lambda: time.sleep(0.3) or "late") == "late"
-
-
 class Rubbish:
     """No record."""
 

@@ -98,12 +98,6 @@ def test_only_results_of_earlier_runs_are_counted_each_once(tmp_path: Path) -> N
     assert later.summary == "1 of 2 results were stored by an earlier run"
 
 
-def test_a_store_without_a_folder_stores_nothing() -> None:
-    store = Store()
-    assert [store.compute("one", {}, lambda: (1, 2)) for _ in range(2)] == [[1, 2], [1, 2]]
-    assert store.load("one", {}) is MISSING and store.summary == ""
-
-
 def test_a_folder_that_cannot_be_written_is_reported_once(tmp_path: Path) -> None:
     messages: list[str] = []
     for folder, report in ((tmp_path / "a", None), (tmp_path / "b", messages.append)):

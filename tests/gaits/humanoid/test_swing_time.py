@@ -1,7 +1,5 @@
 """Bounds on times and velocities from the joints that swing a robot's legs."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -46,16 +44,6 @@ def test_bounds_of_a_robot_of_other_size_are_wider_and_those_of_naos_size_the_pa
         usual = make_usual_bounds(body, variable)
         assert variable.lower <= usual.lower < usual.upper <= variable.upper
     assert make_usual_bounds(body, time).lower == pytest.approx(body.scale_time(0.4), rel=1e-3)
-
-
-def test_random_starts_are_in_proportion_to_naos(tmp_path: Path) -> None:
-    problem = load("humanoid-ssp", robot=crooked(tmp_path), intervals=2)
-    body = make_humanoid(problem.options["robot"])
-    usual = [make_usual_bounds(body, variable) for variable in problem.variables]
-    x = problem.start_point(np.random.default_rng(0))
-    assert all(v.lower <= value <= v.upper for v, value in zip(usual, x, strict=True))
-    slow = problem.with_values(**{"single_support_time_s.upper": usual[-1].lower / 2})
-    assert slow.start_point(np.random.default_rng(0))[-1] <= usual[-1].lower / 2
 
 
 def test_an_infeasible_walk_names_the_bounds_that_are_not_the_robots() -> None:

@@ -119,18 +119,3 @@ def test_smoothness_is_the_mean_square_of_differences_of_signals(name: str, sign
     rates = np.diff(arrays[signal], axis=0) / np.diff(arrays["t"])[:, None]
     cost = evaluated(problem, padded(problem)).cost
     assert cost == pytest.approx((rates**2).sum(axis=1).mean(), rel=1e-9)
-
-
-def test_starts_have_coefficients_near_zero() -> None:
-    problem = load("nao-ssp", trajectory="spline-2")
-    x = problem.start_point(np.random.default_rng(0))
-    assert 0.0 < np.abs(x[9:] / problem.upper[9:]).max() <= 0.05
-    assert ((problem.lower <= x) & (x <= problem.upper)).all()
-
-
-@pytest.mark.slow
-def test_squared_torques_are_their_mean_over_time() -> None:
-    problem = load("nao-ssp", objective="torque")
-    arrays = problem.signals(padded(problem)).arrays
-    mean = np.trapezoid((arrays["tau"] ** 2).sum(axis=1), arrays["t"]) / arrays["t"][-1]
-    assert evaluated(problem, padded(problem)).cost == pytest.approx(mean, rel=1e-9)

@@ -156,14 +156,6 @@ def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: l
     assert figures["lift_off_torque_jump_Nm"] == pytest.approx(np.abs(lift_off).max(), rel=ROUNDING)
 
 
-def test_a_step_beyond_its_bounds_is_a_violation(at_speed: GaitProblem) -> None:
-    x = candidates(at_speed)[0]
-    fast = at_speed.with_values(speed_m_s=0.06)  # a step of 0.144 m
-    found = evaluated(fast, x)
-    row = found.row_names.index("step_length")
-    assert found.g[row] == pytest.approx(0.144) and found.upper[row] == pytest.approx(0.122)
-
-
 def test_the_published_limits_are_the_defaults() -> None:
     problem = load("nao-cycle")
     means = [problem.value(f"{phase}_dbm_{axis}_mean_limit_m") for phase in ("ssp", "dsp") for axis in "xy"]

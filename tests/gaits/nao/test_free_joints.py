@@ -59,15 +59,6 @@ def test_both_yaw_pitch_joints_are_one_and_the_held_arm_joints_stay() -> None:
 
 
 @pytest.mark.slow
-def test_the_ends_are_the_papers() -> None:
-    free = problem_of().signals(leaning(0))
-    planned = load("nao-ssp").signals(np.array(PAPER))
-    for signal in ("q", "qd", "hip", "right_foot", "com"):
-        for row in (0, -1):
-            np.testing.assert_allclose(free.arrays[signal][row], planned.arrays[signal][row], rtol=0, atol=1e-9)
-
-
-@pytest.mark.slow
 def test_a_planned_motion_is_a_free_one_nearly() -> None:
     planned, free = load("nao-ssp"), problem_of("spline-8")
     x = fit_joints("spline-8", planned, np.array(PAPER))

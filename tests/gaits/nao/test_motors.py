@@ -63,13 +63,6 @@ def test_a_flat_battery_binds() -> None:
     assert weak.objective > solve(problem, solver=solver).objective + 1e-4
 
 
-def test_an_index_keeps_the_papers_power() -> None:
-    problem = load("nao-ssp", motors="heat")
-    found = evaluated(problem, X)
-    assert found.indexes["paper_power_W"] == pytest.approx(evaluated(load("nao-ssp"), X).cost)
-    assert found.indexes["power_W"] == found.cost
-
-
 def test_both_are_simulated_with_the_rotors_of_the_plan() -> None:
     for name in ("nao-ssp", "nao-dsp", "nao-cycle"):
         plain, heavy = load(name).display.simulation_model, load(name, motors="rotor").display.simulation_model
@@ -103,8 +96,3 @@ def test_a_cycle_pays_for_its_rotors_and_real_motors() -> None:
     assert t[4] == pytest.approx(0.4)
     light = evaluated(load("nao-cycle", motors="free-braking", intervals=4), x).indexes["ssp_power_W"]
     assert abs(single / light - 1.0) > 0.01
-
-
-def test_another_objective_has_no_power_to_change() -> None:
-    with pytest.raises(InputError, match="objective is joint_jerk"):
-        load("nao-dsp", objective="jerk", motors="heat")

@@ -47,12 +47,6 @@ def test_printed_margins_follow_from_printed_solutions(name: str, algorithm: str
         assert 1000.0 * indexes[index] == pytest.approx(value_mm, abs=0.2), index
 
 
-def test_physical_gravity_and_eleven_samples_miss_a_printed_margin_by_millimetres() -> None:
-    x, margins_mm = PRINTED["nao-ssp", "PSO"]
-    indexes = evaluate("nao-ssp", x).indexes
-    assert 1000.0 * indexes["dbm_x_mean_m"] - margins_mm["dbm_x_mean_m"] == pytest.approx(-3.66, abs=0.01)
-
-
 def test_readings_of_the_zmp_leave_torques_alone() -> None:
     for (name, _), (x, _) in PRINTED.items():
         plain, read = (evaluate(name, x, **options).indexes for options in ({"intervals": 9}, READING[name]))

@@ -9,7 +9,6 @@ import scipy.integrate
 import nlp_gait
 from compare.judge import evaluate
 from compare.papers.stairs.printed import TABLE_3, TABLE_4
-from metaheuristics import ParticleSwarm, minimize
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.stairs.planar_biped import load_toe_foot_biped
@@ -70,14 +69,6 @@ def test_optimum_is_known_and_feasible_on_the_dense_grid(problem: GaitProblem, s
     assert not judged.dense_violations
     assert judged.dense is not None
     assert judged.dense["energy_J"] == pytest.approx(solution.objective, rel=0.01)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("without_compiler")
-def test_a_search_comes_near_from_above(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
-    found = minimize(nlp_gait.compile_objective(problem), ParticleSwarm(), evaluations=1_000, seed=0)
-    assert found.feasible
-    assert found.objective >= solution.objective - 1e-6
 
 
 @pytest.mark.slow

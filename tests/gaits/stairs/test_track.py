@@ -6,7 +6,7 @@ import pytest
 import nlp_gait
 from metaheuristics import AntColony, minimize
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation import GaitProblem
 
 # Stiff gains follow the plan of case 2 within 0.05 rad.
 FOLLOWED_RAD = 0.05
@@ -126,14 +126,6 @@ def test_multiple_shooting_meets_the_ants() -> None:
     assert found.objective == pytest.approx(solution.objective, rel=AGREEMENT)
 
 
-def test_signals(problem: GaitProblem) -> None:
-    arrays: dict[str, Array] = dict(problem.signals(np.array([100.0, 100.0, 1.45])).arrays)
-    assert arrays["t"][[0, -1]] == pytest.approx([0.01, 3.5])
-    assert arrays["q"].shape == arrays["qd"].shape == arrays["tau"].shape == (350, 9)
-    error = np.abs(arrays["q"] - arrays["q_desired"]).max()
-    assert error == pytest.approx(values(problem, [100.0, 100.0, 1.45])[2]["largest_error_rad"])
-
-
 @pytest.mark.slow
 def test_the_network_in_place_of_the_closed_form(problem: GaitProblem) -> None:
     learned, x = nlp_gait.load("stairs-track", inverse_kinematics="network"), [100.0, 100.0, 1.45]
@@ -145,9 +137,3 @@ def test_the_network_in_place_of_the_closed_form(problem: GaitProblem) -> None:
     assert (error[legs] > 0.0).all()
     assert error.max() < NETWORK_ANGLE_RAD
     assert error[~legs].max() == 0.0
-
-
-@pytest.mark.slow
-def test_ipopt_solves_with_the_network() -> None:
-    short = nlp_gait.load("stairs-track", duration_s=0.02, inverse_kinematics="network")
-    assert nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], solver=INTERPRETED).converged
