@@ -12,7 +12,6 @@ from compare.analysis.best_known import ZERO, compute_gap, is_zero
 from compare.analysis.pairs import Pair, compare_pairs, describe_power
 from compare.analysis.record_statistics import (
     Curve,
-    Weighting,
     compute_running_time,
     find_best_known,
     make_curve,
@@ -25,7 +24,6 @@ from compare.study.task import GRADIENT_SOLVERS, SOURCE
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Objective
 
-DEFAULT_WEIGHTING = Weighting()
 SMALLEST_GAP = 1e-8  # that is shown; points may differ from the best known value by less in their last digits
 FOUND = 1e-6  # a run with at most this gap has reached the best known value
 
@@ -86,7 +84,6 @@ class Comparison:
     #: Best known objective, from which gaps are measured: the shipped one, else the best of these runs; NaN without either
     reference: float
     known: Reference  #: the shipped value with its proven bound, and the source of ``reference`` in words
-    weighting: Weighting
     solvers: tuple[SolverRuns, ...]
 
     @property
@@ -146,7 +143,6 @@ class Comparison:
 
 def compare_problems(
     records: Sequence[RunRecord],
-    weighting: Weighting = DEFAULT_WEIGHTING,
     references: Mapping[str, float] | None = None,
 ) -> list[Comparison]:
     """Return one comparison per problem among records, in their order; InputError if runs disagree on a problem's objective.
@@ -157,12 +153,10 @@ def compare_problems(
     groups: dict[str, list[RunRecord]] = {}
     for record in records:
         groups.setdefault(record.problem, []).append(record)
-    return [_make_comparison(name, group, weighting, (references or {}).get(name)) for name, group in groups.items()]
+    return [_make_comparison(name, group, (references or {}).get(name)) for name, group in groups.items()]
 
 
-def _make_comparison(
-    problem: str, records: Sequence[RunRecord], weighting: Weighting, reference: float | None
-) -> Comparison:
+def _make_comparison(problem: str, records: Sequence[RunRecord], reference: float | None) -> Comparison:
     objective = records[0].inputs.objective
     for record in records:
         if record.inputs.objective != objective:
@@ -177,7 +171,7 @@ def _make_comparison(
             SolverRuns(
                 name=name,
                 records=runs,
-                curves=tuple(make_curve(r, objective, reference, weighting) for r in runs),
+                curves=tuple(make_curve(r, objective, reference) for r in runs),
                 costs=tuple(objective.sign * r.verdict.objective if r.verdict.feasible else math.inf for r in runs),
             )
         )
@@ -187,7 +181,6 @@ def _make_comparison(
         objective=objective,
         reference=reference,
         known=known,
-        weighting=weighting,
         solvers=tuple(solvers),
     )
 

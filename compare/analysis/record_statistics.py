@@ -20,32 +20,18 @@ TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 ECDF_TARGETS: tuple[float, ...] = tuple(float(target) for target in np.logspace(0, -6, 31))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Weighting:
-    """Weight of each kind of call, in evaluations of objective and constraints at one point.
+def list_weights(n: int) -> dict[str, float]:
+    """Return the weight of each kind of call, in evaluations of objective and constraints at one point, for n variables.
 
-    The defaults count derivatives like forward differences, objective and constraints separately: n + 1 for a first
-    derivative, (n + 1)(n + 2) / 2 for the second. This never favours gradient methods.
+    Derivatives count like forward differences, objective and constraints separately. This never favours gradient methods.
     """
+    return {"f": 1.0, "g": 1.0, "gradient": n + 1.0, "jacobian": n + 1.0, "hessian": (n + 1) * (n + 2) / 2}
 
-    f: float = 1.0  #: of the objective (in searches with all constraints)
-    g: float = 1.0  #: of the constraints alone
-    gradient: float | None = None  #: of the objective's gradient; None for n + 1
-    jacobian: float | None = None  #: of the constraints' Jacobian; None for n + 1
-    hessian: float | None = None  #: of the Lagrangian's Hessian; None for (n + 1)(n + 2) / 2
 
-    def of_kind(self, n: int) -> dict[str, float]:
-        """Return the weight of each kind of call for n variables."""
-        second = (n + 1) * (n + 2) / 2
-        defaults = {"f": 1.0, "g": 1.0, "gradient": n + 1.0, "jacobian": n + 1.0, "hessian": second}
-        return {
-            kind: default if getattr(self, kind) is None else getattr(self, kind) for kind, default in defaults.items()
-        }
-
-    def equivalent(self, calls: Mapping[str, int], n: int) -> float:
-        """Return the equivalent evaluations of counted calls."""
-        weights = self.of_kind(n)
-        return float(sum(weights[kind] * count for kind, count in calls.items()))
+def count_equivalent(calls: Mapping[str, int], n: int) -> float:
+    """Return the equivalent evaluations of counted calls for n variables."""
+    weights = list_weights(n)
+    return float(sum(weights[kind] * count for kind, count in calls.items()))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,14 +56,14 @@ class Curve:
         return float(costs[-1]) if len(costs) else 0.0
 
 
-def make_curve(record: RunRecord, objective: Objective, reference: float, weighting: Weighting) -> Curve:
+def make_curve(record: RunRecord, objective: Objective, reference: float) -> Curve:
     """Return the best so far of a run, with gaps from a reference objective; its end alone if its evaluations are unknown."""
     if not record.evaluations:
         gap = compute_gap(record.verdict.objective, reference, objective) if record.verdict.feasible else math.inf
         return Curve(evaluations=np.array([math.nan]), seconds=np.array([record.time_s.solve]), gap=np.array([gap]))
     evaluations = np.array(record.history.evaluations, dtype=float)
     if evaluations.size:  # derivatives are counted at the end
-        evaluations[-1] = max(evaluations[-1], weighting.equivalent(record.evaluations, len(record.x)))
+        evaluations[-1] = max(evaluations[-1], count_equivalent(record.evaluations, len(record.x)))
     values = np.array([math.nan if value is None else value for value in record.history.objective], dtype=float)
     if not record.verdict.feasible:
         values[:] = math.nan  # an infeasible result has reached no target
@@ -133,23 +119,6 @@ def compute_ecdf(costs: Array) -> tuple[Array, Array]:
     solved = np.sort(costs[np.isfinite(costs)])
     steps, counts = np.unique(solved, return_counts=True)
     return steps, np.cumsum(counts) / max(len(costs), 1)
-
-
-def compute_profiles(costs: Mapping[str, Sequence[float]]) -> dict[str, tuple[Array, Array]]:
-    """Return ``compute_ecdf`` of each solver's costs as factors of the cheapest solver's.
-
-    ``costs`` by solver are those of each instance (I,), in the same order; infinite if not solved. Instances that no solver
-    solves count as unsolved for all.
-
-    Source:
-        Dolan, More (2002), Benchmarking optimization software with performance profiles.
-    """
-    table = np.array([list(row) for row in costs.values()], dtype=float)
-    cheapest = table.min(axis=0)
-    known = np.isfinite(cheapest)
-    ratios = np.full_like(table, np.inf)
-    ratios[:, known] = table[:, known] / cheapest[known]
-    return {solver: compute_ecdf(row) for solver, row in zip(costs, ratios, strict=True)}
 
 
 def compute_band(costs: Sequence[Array], gaps: Sequence[Array], grid: Array) -> tuple[Array, Array, Array]:

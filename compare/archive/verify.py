@@ -264,8 +264,8 @@ def _check_texts(folder: Path, records: Sequence[RunRecord], manifest: Manifest,
                 pairs = zip_longest(known.decode(errors="replace").split("\n"), again.decode().split("\n"))
                 number, a, b = next((n, a, b) for n, (a, b) in enumerate(pairs, start=1) if a != b)
                 raise InputError(
-                    f"line {number} of {path.name} is {a!r:.100}, but the records give {b!r:.100}; if weights were given, or "
-                    "another version wrote it, write it again with `report`"
+                    f"line {number} of {path.name} is {a!r:.100}, but the records give {b!r:.100}; if another "
+                    "version wrote it, write it again with `report`"
                 )
     return f"{_list_some([path.name for path in written])} follow from the records"
 

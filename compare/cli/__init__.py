@@ -46,11 +46,11 @@ PANELS = {
 REPLACEMENTS = {
     name.strip(): sentence
     for names, sentence in {
-        "animate": "export --to gif (or html) draws a gait",
+        "animate": "export --to html plays a gait",
         "archive, bench --submit": "verify FOLDER --pack FILE.zip packs a study",
         "bench --verify, bench --rerun, bench --code": "verify FILE.zip checks an archive, with --rerun and --code",
         "bench --objectives": "pareto PROBLEM --search NSGA2=10000 compares searches with the true front",
-        "capabilities": "sweep --capabilities reports what a robot can do",
+        "capabilities, sweep --capabilities": "sweep --over speed_m_s=LOW:HIGH:COUNT names what stops the robot",
         "cite": "list --cite [NAME] prints BibTeX",
         "export-objective, export-solver, export --format": "export --to KIND names the kind of the file",
         "list --algorithms": "list algorithms shows the settings of all",

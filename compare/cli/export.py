@@ -17,12 +17,10 @@ from nlp_gait.export.formats import FORMATS, PERIOD_MS, write_as
 from nlp_gait.export.solver import export_solver
 from nlp_gait.formulation import Result
 from nlp_gait.gaitbench.c_export import export_objective
-from nlp_gait.simulation.video import check_frames, check_video_path, write_video
 
-FRAMES_PER_S = 12.5
 SOURCE = "A gait from `solve --out` or `plan --out`; for objective and solver a problem or an instance of GaitBench."
 KIND = (
-    "Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, ros; gif or html. Of a problem: objective (C++) or "
+    "Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, ros, html. Of a problem: objective (C++) or "
     "solver (NLP with derivatives in C++)."
 )
 OUT = "File, by default next to the result; for objective and solver a folder."
@@ -39,7 +37,7 @@ def export(
     limits: Limits = None,
     code: Code = None,
 ) -> Output:
-    """Write a gait for other tools or as a film, or a problem for other solvers.
+    """Write a gait for other tools or as a page in 3-D, or a problem for other solvers.
 
     C++ needs only libc and libm, and has a C header, a build script, an example in C, and for `objective` callers for MATLAB,
     Octave and Julia.
@@ -72,18 +70,6 @@ def _write_page(path: Path, result: Result, period_ms: int) -> None:
     animate_gait(result.problem, result.x, result.problem.name).write(path)
 
 
-def _write_film(path: Path, result: Result, period_ms: int) -> None:
-    """Draw a gait as a stick figure with support polygon, zero-moment point and centre of mass."""
-    from compare.drawing.gait_figure import make_skeleton
-    from compare.drawing.poses import draw_frames
-
-    check_video_path(path)
-    skeleton = make_skeleton(result, FRAMES_PER_S)
-    duration_s = float(skeleton.t[-1] - skeleton.t[0])
-    check_frames(duration_s, FRAMES_PER_S)
-    write_video(path, draw_frames(skeleton), (len(skeleton.t) - 1) / duration_s)
-
-
 def _write_objective(source: str, changes: ProblemOptions, folder: Path) -> list[Path]:
     if changes != ProblemOptions():
         raise InputError("--to objective writes an instance as it is; leave out --set and --limit")
@@ -97,7 +83,6 @@ def _write_solver(source: str, changes: ProblemOptions, folder: Path) -> list[Pa
 # Kinds of files for a gait: usual ending, and the function that writes it, with the time between rows [ms].
 GAITS: Mapping[str, tuple[str, Callable[[Path, Result, int], None]]] = {
     **{name: (ending, partial(write_as, name)) for name, ending in FORMATS.items()},
-    "gif": (".gif", _write_film),
     "html": (".html", _write_page),
 }
 PROBLEMS: Mapping[str, Callable[[str, ProblemOptions, Path], Sequence[Path]]] = {

@@ -10,7 +10,6 @@ from typer import Option
 from compare.cli import options
 from compare.cli.command import CONTINUE, command, describe_stored
 from compare.cli.printing import Output, Rows, describe_command, say, show_progress
-from compare.questions.capabilities import Capabilities
 from compare.questions.certainty import Certainty, search_point
 from compare.questions.pareto.pareto import Pareto, parse_searches
 from compare.questions.prices import Prices
@@ -38,7 +37,6 @@ COMPLETE = "With --check: also repeat the whole proof; rerun to continue."
 OVER = "Real motors, feature by feature; richer and richer motions with free joints at the end; or values of an option."
 VARIANT = "A variant by name, next to the problem itself; `problem` is another problem's name; repeatable."
 SEARCHES = "NSGA2 or CMOPSO; repeatable. 'none' for no search."
-CAPABILITIES = "Of a walking cycle instead: its highest speed, longest step, highest lift."
 ENGINE = "Simulate steps of each walking cycle in MuJoCo (extra sim)."
 
 
@@ -209,10 +207,7 @@ def robust(
 @command
 def sweep(
     *,
-    over: Annotated[
-        list[str] | None, Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")
-    ] = None,
-    capabilities: Annotated[bool, Option("--capabilities", help=CAPABILITIES)] = False,
+    over: Annotated[list[str], Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")],
     algorithm: Annotated[str, Option(help="ipopt, or a search algorithm.")] = "ipopt",
     starts: options.Starts = 5,
     evaluations: options.Evaluations = 10_000,
@@ -228,19 +223,11 @@ def sweep(
 
     With speeds as an axis the objective of a walking cycle is its power. Simulations are open loop.
 
-    With `--capabilities` each quantity comes with the limits that stop it. Bounds on times and velocities that are this
-    package's, not the robot's, are named, and moved where they stop the robot. The sharpest turn is reported, too.
-
     Examples: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`,
     `nlp-gait sweep nao-cycle --over speed_m_s=0.01:0.1:10 --engine`,
-    `nlp-gait sweep humanoid-cycle --robot my.urdf --over speed_m_s=0.02,0.05`,
-    `nlp-gait sweep humanoid-cycle --robot my.urdf --set intervals=5 --capabilities`
+    `nlp-gait sweep humanoid-cycle --robot my.urdf --set intervals=5 --over speed_m_s=0.1:0.6:6`
     """
-    if capabilities == bool(over):
-        raise InputError("a sweep takes either --over NAME=LOW:HIGH:COUNT or --capabilities")
-    if capabilities:
-        return run_question(Capabilities(problem=problem.load(), starts=starts, seed=seed), out)
-    axes = [parse_axis(text) for text in over or ()]
+    axes = [parse_axis(text) for text in over]
     if problem.name in CYCLES and any(axis.name == SPEED for axis in axes):
         problem = replace(problem, values=["objective=power", *(problem.values or ())])
     effort = {"starts": starts, "evaluations": evaluations, "seed": seed, "steps": steps if engine else 0}

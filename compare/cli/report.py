@@ -1,6 +1,5 @@
 """``nlp-gait report`` and ``nlp-gait reproduce``."""
 
-import math
 from pathlib import Path
 from typing import Annotated
 
@@ -8,27 +7,24 @@ from typer import Argument, Option
 
 from compare.analysis.comparison import compare_problems
 from compare.analysis.failures import describe_unknown
-from compare.analysis.record_statistics import Weighting
 from compare.cli.command import OUTPUT, command, describe_stored
 from compare.cli.compare import list_excluded
-from compare.cli.options import Code, Scheduler, name_all, parse_numbers
+from compare.cli.options import Code, Scheduler, name_all
 from compare.cli.printing import Output, describe_command, say, show_progress
 from compare.logs import write_ioh
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.papers.paper_runs import Runner
-from compare.report import FurtherFiles, rebuild_report, watch_report, write_report
+from compare.report import FurtherFiles, write_report
 from compare.study.evidence import read_evidence
 from compare.study.settings import read_manifest
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
 
-WEIGHTS = "Evaluations, at least 0, counted for a first derivative and a Hessian (default: n + 1, (n + 1)(n + 2)/2)."
 CSV = "Write all runs and all judged points as CSV files too."
 LATEX = "Also write tables for papers: of each problem, and of all problems and solvers (LaTeX, package booktabs)."
 DIGITS = "Decimals of objectives in these tables (default: as many as different medians need to differ)."
 FIGURES = "Also write all figures as PNG, and for papers as PDF, one column wide, with captions in LaTeX."
 LOGS = "Also write the runs as logs for iohinspector, into the folder logs."
-WATCH = "Rewrite the report while the study runs; the open page reloads itself."
 OUT = "Folder for the report, its tables and figures; results stored in it are used again."
 QUICK = "The least work that fills every table and figure, instead of the paper's."
 EFFORT = "JSON file with other settings, as `settings` of `summary.json`; the rest are the paper's."
@@ -38,14 +34,12 @@ EFFORT = "JSON file with other settings, as `settings` of `summary.json`; the re
 def report(
     *,
     folder: Annotated[Path, Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
-    weights: Annotated[str | None, Option(metavar="GRADIENT,HESSIAN", help=WEIGHTS)] = None,
     latex: Annotated[bool, Option("--latex", help=LATEX)] = False,
     digits: Annotated[int | None, Option(min=0, max=15, help=DIGITS)] = None,
     figures: Annotated[bool, Option("--figures", help=FIGURES)] = False,
     logs: Annotated[bool, Option("--logs", help=LOGS)] = False,
     code: Code = None,
     csv: Annotated[bool, Option("--csv", help=CSV)] = False,
-    watch: Annotated[bool, Option("--watch", help=WATCH)] = False,
 ) -> Output:
     """Rewrite a study's report from all records of its folder, without running a solver.
 
@@ -53,19 +47,13 @@ def report(
     evaluated again. Records whose numbers do not follow from it, or that contradict a proof, are excluded; then the exit status
     is 1.
 
-    With `--watch` the report follows a running study until Ctrl-C.
-
-    Examples: `nlp-gait report results`, `nlp-gait report results --weights 5,25`
+    Examples: `nlp-gait report results`, `nlp-gait report results --latex --figures`
     """
-    weighting = _parse_weights(weights)
     name_all(code)
-    if watch:
-        say(f"open {folder / 'report.html'}; it follows the study in {folder} until Ctrl-C")
-        watch_report(folder, lambda: rebuild_report(folder, weighting))
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = evidence.records
     further = FurtherFiles(csv=csv, latex=latex or digits is not None, decimals=digits, figures=figures)
-    written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
+    written = write_report(folder, records, manifest, excluded=evidence.excluded, further=further)
     if logs:
         comparisons = compare_problems(records)
         for sentence in (s for comparison in comparisons for s in describe_unknown(comparison)):
@@ -73,15 +61,6 @@ def report(
         write_ioh(comparisons, folder / "logs")
         written.append(folder / "logs")
     return Output(data={"excluded": evidence.sentences}, written=written, failures=list_excluded(evidence.sentences))
-
-
-def _parse_weights(text: str | None) -> Weighting:
-    if text is None:
-        return Weighting()
-    values = parse_numbers("a weight", text, "--weights")
-    if len(values) != 2 or not all(math.isfinite(value) and value >= 0.0 for value in values):
-        raise InputError(f"--weights takes two finite numbers >= 0, GRADIENT,HESSIAN, got {text!r}")
-    return Weighting(gradient=values[0], jacobian=values[0], hessian=values[1])
 
 
 @command

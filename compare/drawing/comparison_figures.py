@@ -11,7 +11,7 @@ import numpy as np
 
 from compare.analysis.comparison import SMALLEST_GAP, Comparison, SolverRuns, index_solvers
 from compare.analysis.overview import Ranking
-from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS, compute_band, compute_ecdf, compute_profiles
+from compare.analysis.record_statistics import ECDF_TARGETS, compute_band, compute_ecdf
 from compare.analysis.units import format_percent
 from compare.drawing.charts import Chart, Series
 from nlp_gait.formulation import Array
@@ -128,25 +128,6 @@ def make_suite_ecdf_charts(comparisons: Sequence[Comparison]) -> list[Chart]:
     series = [_make_share(name, *shares[name], last) for name in best_first]
     words = "share of problems, runs and targets"
     return [Chart(x="equivalent evaluations per variable", y=words, series=series, log=(True, False), range=SHARES)]
-
-
-def make_profile_charts(comparisons: Sequence[Comparison]) -> list[Chart]:
-    """Return the performance profile of expected running times over problems and targets; solvers that ran on all."""
-    profile = compute_profiles(list_expected_costs(comparisons))
-    last = max([factor[-1] for factor, _ in profile.values() if factor.size], default=1.0) * 2.0
-    series = [_make_share(name, *shares, last) for name, shares in profile.items()]
-    x, y = "factor of the cheapest solver's expected evaluations", "share of problems and targets"
-    return [Chart(x=x, y=y, series=series, log=(True, False), range=SHARES)]
-
-
-def list_expected_costs(comparisons: Sequence[Comparison]) -> dict[str, list[float]]:
-    """Return expected evaluations for each problem and target by solver.
-
-    Only solvers that ran on all problems with known evaluations.
-    """
-    by_name, shared = index_solvers(comparisons)
-    known = [name for name in shared if all(solvers[name].has_costs("evaluations") for solvers in by_name)]
-    return {name: [solvers[name].expected_cost(target) for solvers in by_name for target in TARGETS] for name in known}
 
 
 def make_critical_difference_charts(ranking: Ranking) -> list[Chart]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,16 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PERIOD_S = 0.02  # between samples
-
-
-@lock_casadi
-def make_skeleton(result: Result, frames_per_s: float) -> Skeleton:
-    """Return the skeleton of a gait with about this many samples a second; raises InputError for a problem without one."""
-    problem = result.problem
-    if problem.display.skeleton is None:
-        raise InputError(f"problem {problem.name!r} has no skeleton to draw; the engine shows it: `simulate --page`")
-    drawn = problem.display.skeleton(sample_signals(result, 1.0 / frames_per_s), problem.parameter_values)
-    return replace(drawn, title=problem.title)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -1,12 +1,10 @@
-"""Report of a study from its records, written once or while the study runs."""
+"""Report of a study from its records, and the better points in it."""
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
+from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import MANY, write_headlines
-from compare.analysis.record_statistics import Weighting
 from compare.drawing.figures import share_looks
 from compare.judge import evaluate
 from compare.report.document import Document, Section, make_table_section
@@ -25,59 +23,29 @@ from compare.report.study_sections import (
     make_settings_section,
 )
 from compare.report.writing import write_document
-from compare.study.evidence import Exclusion, read_evidence
+from compare.study.evidence import Exclusion
 from compare.study.record import RunRecord, load_gait
-from compare.study.record_files import RECORDS, name_group
-from compare.study.settings import Manifest, read_manifest
-from nlp_gait.files import make_file_name, replace_nan, write_json, write_text
+from compare.study.record_files import name_group
+from compare.study.settings import Manifest
+from nlp_gait.files import make_file_name, replace_nan, write_json
 
 REPORT_ALONE = FurtherFiles()
-RELOAD = '<head>\n<meta http-equiv="refresh" content="5">'  # seconds between reloads of the page
-POLL_S = 2.0
-
-
-def rebuild_report(
-    folder: Path, weighting: Weighting = DEFAULT_WEIGHTING, further: FurtherFiles = REPORT_ALONE
-) -> list[Path]:
-    """Rewrite the report of all records of a folder, earlier ones included; return its files. Raises as ``read_evidence``."""
-    evidence = read_evidence(folder)
-    records, manifest = evidence.records, read_manifest(folder)
-    return write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
 
 
 def write_report(
     folder: Path,
     records: Sequence[RunRecord],
     manifest: Manifest,
-    weighting: Weighting = DEFAULT_WEIGHTING,
     *,
     excluded: Sequence[Exclusion] = (),
     further: FurtherFiles = REPORT_ALONE,
 ) -> list[Path]:
     """Write the report with stored simulations, its figures as SVG, and further files; return all paths."""
-    comparisons = compare_problems(records, weighting)
+    comparisons = compare_problems(records)
     with share_looks({record.solver for record in records}):
         document = make_study_document(comparisons, manifest, excluded)
         written = write_document(folder, document)
         return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons, document)]
-
-
-def watch_report(folder: Path, rewrite: Callable[[], object], sleep: Callable[[float], None] = time.sleep) -> None:
-    """Rewrite the report of a folder after every change of its records until Ctrl-C; its page reloads itself meanwhile.
-
-    ``rewrite`` writes the report. A folder without records is waited for.
-    """
-    page, shown = folder / "report.html", None
-    try:
-        while True:
-            records = {path: path.stat().st_mtime_ns for path in (folder / RECORDS).glob("*/*.json")}
-            if records and records != shown:
-                rewrite()
-                write_text(page, page.read_text(encoding="utf-8").replace("<head>", RELOAD, 1))
-                shown = records
-            sleep(POLL_S)
-    except KeyboardInterrupt:
-        return
 
 
 def make_study_document(

@@ -8,15 +8,14 @@ from compare.analysis.columns import EFFORT, EVALUATIONS_TO, JUDGEMENT, MAIN, SE
 from compare.analysis.comparison import Comparison
 from compare.analysis.failures import describe_unknown
 from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers, rank_over_problems
+from compare.analysis.record_statistics import list_weights
 from compare.analysis.units import BY_UNIT
 from compare.drawing.charts import Chart, draw_charts, encode_charts
 from compare.drawing.comparison_figures import (
-    list_expected_costs,
     make_convergence_charts,
     make_critical_difference_charts,
     make_ecdf_charts,
     make_final_gap_charts,
-    make_profile_charts,
 )
 from compare.drawing.gait_figure import GaitCurves, draw_gaits, make_gait_charts, prepare_gait
 from compare.report.document import Figure, Part, Prose, Section, Table, make_table_section, make_text_table
@@ -232,8 +231,7 @@ def make_settings_section(comparisons: Sequence[Comparison], sessions: Sequence[
     """Return what the solvers claim, how costs are counted, all settings, sessions, citations and terms."""
     sizes = [max((len(r.x) for r in c.records), default=0) for c in comparisons]
     weights = [
-        (c.problem, *map("{:g}".format, c.weighting.of_kind(n).values()))
-        for c, n in zip(comparisons, sizes, strict=True)
+        (c.problem, *map("{:g}".format, list_weights(n).values())) for c, n in zip(comparisons, sizes, strict=True)
     ]
     problems = {c.problem: c.records[0].inputs.problem for c in comparisons}
     options = [
@@ -272,14 +270,6 @@ def make_overview(comparisons: Sequence[Comparison]) -> Section:
         _make_matrix(comparisons, ranking),
         *(make_wins_table(comparisons, solver) for solver in list_user_solvers(comparisons)),
     ]
-    if list_expected_costs(comparisons):
-        parts.append(
-            make_chart_figure(
-                "performance-profile",
-                "Share of problems and targets that a solver reaches within a factor of the cheapest one's expected evaluations.",
-                make_profile_charts(comparisons),
-            )
-        )
     if ranking.critical_difference is not None:
         parts.append(
             make_chart_figure(

@@ -15,16 +15,15 @@ from compare.analysis.record_statistics import (
     ECDF_TARGETS,
     TARGETS,
     Curve,
-    Weighting,
     approximate_rank_sum,
     bootstrap_interval,
     compute_a12,
     compute_band,
     compute_ecdf,
-    compute_profiles,
     compute_rank_sum,
     compute_running_time,
     correct_by_holm,
+    count_equivalent,
     find_best_known,
     make_curve,
 )
@@ -35,14 +34,10 @@ POWER = Objective(name="power", unit="W")
 costs = st.lists(st.floats(0.0, 10.0) | st.just(math.inf), min_size=2, max_size=12)
 
 
-def test_weighting_charges_derivatives_as_finite_differences() -> None:
+def test_derivatives_are_counted_as_finite_differences() -> None:
     # n = 9: 10 for a first derivative, 10 * 11 / 2 = 55 for the second.
     calls = {"f": 3, "g": 2, "gradient": 4, "jacobian": 5, "hessian": 6}
-    assert Weighting().equivalent(calls, 9) == 3 + 2 + 40 + 50 + 330
-    assert Weighting(g=0.0, gradient=2.0, jacobian=3.0, hessian=0.5).equivalent(calls, 9) == 3 + 8 + 15 + 3
-    # A kind of call without a weight of its own is charged, not forgotten.
-    weights = Weighting(f=None, g=None).of_kind(2)  # type: ignore[arg-type]
-    assert weights == {"f": 1.0, "g": 1.0, "gradient": 3.0, "jacobian": 3.0, "hessian": 6.0}
+    assert count_equivalent(calls, 9) == 3 + 2 + 40 + 50 + 330
 
 
 def test_expected_running_time() -> None:
@@ -70,18 +65,18 @@ def test_gap_is_relative_to_the_reference(value: float, reference: float, object
 
 
 def test_curve_of_a_search_and_of_a_gradient_method() -> None:
-    found = make_curve(record("pso", 0, [(10, None), (20, 11.0), (30, 10.0)]), POWER, 10.0, Weighting())
+    found = make_curve(record("pso", 0, [(10, None), (20, 11.0), (30, 10.0)]), POWER, 10.0)
     assert found.gap.tolist() == pytest.approx([math.inf, 0.1, 0.0])
     assert (found.cost_to_reach(0.1), found.cost_to_reach(0.05), found.cost_to_reach(-1.0)) == (20.0, 30.0, math.inf)
     assert found.cost_to_reach(0.05, "seconds") == found.total_cost("seconds") == pytest.approx(0.3)
     assert found.total_cost() == 30.0 and found.evaluations.dtype == found.gap.dtype == found.seconds.dtype == float
     # 2 variables: 4 + 3 * 3 + 2 * 6 = 25, all spent by the end.
     calls = {"f": 4, "gradient": 3, "hessian": 2}
-    ended = make_curve(record("ipopt", 0, [(4, 10.0)], evaluations=calls), POWER, 10.0, Weighting())
+    ended = make_curve(record("ipopt", 0, [(4, 10.0)], evaluations=calls), POWER, 10.0)
     assert ended.evaluations.tolist() == [25.0] and ended.cost_to_reach(0.0) == 25.0
-    refused = make_curve(record("pso", 0, [(10, 9.0)], feasible=False), POWER, 10.0, Weighting())
+    refused = make_curve(record("pso", 0, [(10, 9.0)], feasible=False), POWER, 10.0)
     assert refused.cost_to_reach(1.0) == math.inf
-    assert np.isposinf(make_curve(record("pso", 0, [(10, None), (20, None)]), POWER, 10.0, Weighting()).gap).all()
+    assert np.isposinf(make_curve(record("pso", 0, [(10, None), (20, None)]), POWER, 10.0).gap).all()
     failed = Curve(evaluations=np.empty(0), seconds=np.empty(0), gap=np.empty(0))
     assert (failed.total_cost(), failed.total_cost("seconds"), failed.cost_to_reach(1.0)) == (0.0, 0.0, math.inf)
 
@@ -92,19 +87,6 @@ def test_curve_of_a_search_and_of_a_gradient_method() -> None:
 )
 def test_ecdf_counts_unsolved_pairs(costs: list[float], at: list[float], share: list[float]) -> None:
     assert [part.tolist() for part in compute_ecdf(np.array(costs))] == [at, share]
-
-
-@pytest.mark.parametrize(
-    ("costs", "a", "b"),
-    [
-        (([10.0, 40.0, math.inf], [20.0, 10.0, math.inf]), [[1, 4], [1 / 3, 2 / 3]], [[1, 2], [1 / 3, 2 / 3]]),
-        (([1, 100], [2, 50]), [[1, 2], [0.5, 1]], [[1, 2], [0.5, 1]]),  # whole numbers; each instance has its cheapest
-    ],
-)
-def test_performance_profile(costs: tuple[list[float], ...], a: list[list[float]], b: list[list[float]]) -> None:
-    profile = compute_profiles(dict(zip("ab", costs, strict=True)))
-    for found, expected in zip((*profile["a"], *profile["b"]), (*a, *b), strict=True):
-        assert found.tolist() == pytest.approx(expected)
 
 
 def test_band_keeps_the_last_gap_of_a_run_that_has_ended_and_takes_the_lower_middle() -> None:

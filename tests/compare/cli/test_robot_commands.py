@@ -68,12 +68,10 @@ def test_export_writes_next_to_the_result_by_default(gait):
     assert gait.with_name("gait.motion").read_text().startswith("#WEBOTS_MOTION,V1.0,LHipYawPitch,")
 
 
-def test_export_writes_a_film_and_a_page(gait):
+def test_export_writes_a_page(gait):
     gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.3}}))
     for _ in range(2):  # its own file may be replaced
-        nlp_gait("export", gait, "--to", "gif")
-    assert gait.with_suffix(".gif").stat().st_size > 5_000
-    nlp_gait("export", gait, "--to", "html")
+        nlp_gait("export", gait, "--to", "html")
     assert "support polygon" in gait.with_suffix(".html").read_text()
 
 

@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from compare.drawing.gait_figure import make_skeleton
-from compare.drawing.poses import draw_frames
-from nlp_gait.errors import InputError
-from nlp_gait.formulation import Result, list_problems
+from nlp_gait.formulation import Result, list_problems, sample_signals
 
 SSP = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)
 WALK = (0.13, 0.1135, 0.02, 0.0204)
@@ -16,7 +13,10 @@ WALK = (0.13, 0.1135, 0.02, 0.0204)
 def drawn(name, x=None, frames_per_s=2.5, **options):
     problem = nlp_gait.load(name, **options)
     point = problem.start_point(np.random.default_rng(0)) if x is None else problem.check_x(x)
-    return make_skeleton(Result(problem=problem, x=point), frames_per_s)
+    assert problem.display.skeleton is not None
+    return problem.display.skeleton(
+        sample_signals(Result(problem=problem, x=point), 1.0 / frames_per_s), problem.parameter_values
+    )
 
 
 @pytest.fixture(scope="module")
@@ -54,11 +54,6 @@ def test_every_problem_can_be_drawn(name):
     assert all(len(limb.points) == len(skeleton.t) for limb in skeleton.limbs)
 
 
-def test_a_climb_is_shown_by_the_engine_only():
-    with pytest.raises(InputError, match="'stairs-climb' has no skeleton to draw; .* `simulate --page`"):
-        drawn("stairs-climb")
-
-
 def test_the_drawn_stair_climber_is_where_its_planner_puts_it():
     problem = nlp_gait.load("stairs-plan")
     x = problem.start_point(np.random.default_rng(0))
@@ -77,11 +72,3 @@ def test_stairs_are_drawn_under_the_feet():
     assert len(rises) == 3 and rises[1] == 0.0 and rises[2] == pytest.approx(-rises[0])
     stance = next(limb for limb in stairs.limbs if limb.side == "left").points
     np.testing.assert_allclose(stance[:, 2:, 2], 0.0, atol=1e-12)
-
-
-@pytest.mark.slow
-def test_frames_differ(nao):
-    made = draw_frames(nao)
-    first, second = next(made), next(made)
-    assert first.shape == second.shape and first.dtype == np.uint8
-    assert (first != second).any() and first.min() < 100

@@ -12,7 +12,6 @@ import pytest
 
 import compare.questions
 from compare.questions import local_optima
-from compare.questions.capabilities import Capabilities
 from compare.questions.certainty import Certainty
 from compare.questions.pareto.pareto import Pareto
 from compare.questions.prices import Prices
@@ -26,7 +25,6 @@ from nlp_gait import load
 from nlp_gait.files import replace_nan
 from nlp_gait.formulation import GaitProblem
 from tests.compare.cli.calls import as_json, nlp_gait
-from tests.compare.questions.test_capabilities import make_walk
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
@@ -78,7 +76,6 @@ CASES = {
     "prices": Case(
         make=lambda: Prices(problem=load("walk12"), starts=2), rows="limits", line="prices walk12 --starts 2"
     ),
-    "capabilities": Case(make=lambda: Capabilities(problem=make_walk(), starts=1)),
     "pareto": Case(
         make=lambda: Pareto(
             problem=load("nao-ssp", intervals=4).fix(**ARM),

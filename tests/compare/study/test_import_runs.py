@@ -13,11 +13,11 @@ from compare.analysis.columns import ALL, format_rows, summarise
 from compare.analysis.comparison import compare_problems
 from compare.analysis.failures import describe_unknown
 from compare.judge import evaluate
-from compare.report import FurtherFiles, rebuild_report
+from compare.report import FurtherFiles, write_report
 from compare.study.import_runs import import_runs, read_imported_records, read_points
 from compare.study.record_files import read_records, write_records
 from compare.study.run_study import Study, run_study
-from compare.study.settings import SolverSpec, StudySettings
+from compare.study.settings import SolverSpec, StudySettings, read_manifest
 from compare.study.task import ProblemSpec, Stop
 from nlp_gait.errors import GaitError
 from tests.compare.cli.calls import nlp_gait
@@ -83,7 +83,7 @@ def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
     shown = dict(zip(header, next(row for row in rows if row[0] == "GA (MATLAB)"), strict=True))
     assert shown["time [s]"] == shown["claimed"] == "-" and "nan" not in " ".join(shown.values())
     assert math.isnan(ga["time_s"]) and math.isnan(ga["seconds_to_1"]) and ga["evaluations"] == 5000
-    files = rebuild_report(tmp_path, further=FurtherFiles(csv=True))
+    files = write_report(tmp_path, again, read_manifest(tmp_path), further=FurtherFiles(csv=True))
     page = (tmp_path / "report.md").read_text()
     assert "GA (MATLAB)" in page and not re.search(r"\bnan\b", page.replace("nan,", ""), re.IGNORECASE)
     with open(next(path for path in files if path.name == "runs.csv")) as file:
