@@ -1,16 +1,11 @@
 """Damaged files and command lines, most of which once did harm, are refused in one sentence, or accepted for what they say."""
 
-import copy
 import json
 import os
 import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from compare.cli import app
@@ -166,34 +161,6 @@ def test_what_is_not_such_a_file_is_refused_at_once(name: str, kind: str, tmp_pa
         path.write_bytes(b"" if kind == "empty" else bytes(range(256)))
     verdict = judge(name, path)
     assert (verdict.startswith("refused") and REASONS[kind] in verdict) or name == "stored"  # that is computed again
-
-
-def list_places(raw: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Yield the keys that lead to each value of a JSON document."""
-    for key, value in raw.items() if isinstance(raw, dict) else enumerate(raw):
-        yield (*place, key)
-        if isinstance(value, (dict, list)):
-            yield from list_places(value, (*place, key))
-
-
-leaves = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8) | st.just("x" * 5000)
-values = st.recursive(leaves, lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.text(), inner, max_size=2))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["result", "record", "manifest", "robot", "stored"])
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(data=st.data())
-def test_a_document_of_which_one_value_is_another(name: str, data: st.DataObject, tmp_path: Path) -> None:
-    raw = copy.deepcopy(json.loads(data.draw(st.sampled_from(list_seeds(name)))))
-    *place, last = data.draw(st.sampled_from(list(list_places(raw))))
-    inner = raw
-    for key in place:
-        inner = inner[key]
-    inner[last] = data.draw(values)
-    path = prepare(name, tmp_path)
-    path.write_text(json.dumps(raw))
-    judge(name, path)
 
 
 @pytest.mark.parametrize("line", LINES, ids=lambda line: " ".join(line)[:60].encode("ascii", "replace").decode())

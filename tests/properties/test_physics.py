@@ -11,13 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
-from nlp_gait.gaits.nao.body import GRAVITY, find_upright_links
-from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.tree import make_tree
-from nlp_gait.symbolic.balance import zmp_of_wrench
-from nlp_gait.symbolic.dynamics import newton_euler
 from tests.evaluation import evaluated
-from tests.properties.mirror import JOINT_SIGNS, mirrored, partner
 from tests.robots.custom import Record, nao, written
 
 NAMES = ("nao-ssp", "nao-dsp")
@@ -97,45 +91,6 @@ def test_lengths_scale_like_the_square_of_times(tmp_path: Path, name: str) -> No
         before, after = evaluated(plain, x).indexes, evaluated(large, factors * x).indexes
         assert after["power_W"] == pytest.approx(size / root * before["power_W"], rel=ROUNDING)
         assert after["dbm_y_min_m"] == pytest.approx(size * before["dbm_y_min_m"], rel=ROUNDING, abs=ROUNDING)
-
-
-def loads(robot: Robot, foot: str, arrays: dict[str, Array], sample: int) -> tuple[dict[str, float], Array]:
-    """Torques and ZMP relative to the ankle of a robot that stands on one foot, from joint histories by name."""
-    q, qd, qdd = ({name: arrays[f"{key} {name}"][sample] for name in JOINT_SIGNS} for key in ("q", "qd", "qdd"))
-    tree = make_tree(robot, robot.feet[foot].link)
-    torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=find_upright_links(robot))
-    zmp = zmp_of_wrench(wrench, robot.feet[foot].ankle_height_m, robot.mass_kg * GRAVITY)
-    return {name: float(torque) for name, torque in torques.items()}, np.array([float(zmp[0]), float(zmp[1])])
-
-
-@pytest.mark.slow
-def test_a_gait_mirrored_left_to_right_needs_mirrored_torques() -> None:
-    """Single support on the left foot against the mirrored robot on its right foot."""
-    problem = load("nao-ssp")
-    robot = load_robot("nao-v5")
-    image = mirrored(robot)
-    for x in candidates(problem):
-        signals = problem.signals(x)
-        columns = {name: i for i, name in enumerate(signals.joints)}
-        moving = {
-            f"{key} {partner(name)}": sign * signals.arrays[key][:, columns[name]] if name in columns else np.zeros(11)
-            for key in ("q", "qd", "qdd")
-            for name, sign in JOINT_SIGNS.items()
-        }
-        for sample in (0, 4, 10):
-            torques, zmp = loads(image, "right", moving, sample)
-            for name, column in columns.items():
-                expected = JOINT_SIGNS[name] * signals.arrays["tau"][sample, column]
-                assert torques[partner(name)] == pytest.approx(expected, abs=ROUNDING)
-            expected_zmp = (signals.arrays["zmp"][sample] - (0.06, 0.05)) * (1, -1)
-            np.testing.assert_allclose(zmp, expected_zmp, rtol=0, atol=ROUNDING)
-
-
-def test_the_mirror_image_of_the_mirror_image_is_the_robot() -> None:
-    robot = load_robot("nao-v5")
-    twice = mirrored(mirrored(robot))
-    assert (twice.links, twice.joints, twice.feet) == (robot.links, robot.joints, robot.feet)
-    assert mirrored(robot).links["LThigh"] != robot.links["LThigh"]  # its maker's data are not symmetric
 
 
 @pytest.mark.parametrize(("name", "options"), [("nao-ssp", {}), ("nao-dsp", {}), ("nao-dsp", {"torso_share": "lever"})])

@@ -19,7 +19,6 @@ from compare.study.run_study import Study, check_study, run_study
 from compare.study.run_task import MOST_HISTORY, _choose_entries, try_task
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.errors import GaitError, InputError
-from nlp_gait.formulation import GaitProblem, Objective
 from nlp_gait.formulation.registry import check_mathematics
 from tests.backends.toys import row, toy
 from tests.compare.records import judged
@@ -102,21 +101,6 @@ def test_settings_that_no_record_can_contain_are_rejected_before_the_work(tmp_pa
     task = replace(TASK, solver=f"{tmp_path}/own.py:search", settings={"setting": value})
     with pytest.raises(InputError):
         check_study(Study(tasks=(task,)))
-
-
-@pytest.mark.parametrize("text", [text for text in TEXTS if "$" in text or not text.isprintable()])
-def test_names_and_units_that_no_file_or_axis_can_show_are_rejected_as_the_problem_is_made(text: str) -> None:
-    def check(problem: GaitProblem) -> None:
-        with pytest.raises(InputError, match="printable"):
-            check_mathematics(problem)
-
-    sound = toy(lambda x, y, limit, ops: (x * y, (row(x, upper=limit),)))
-    check_mathematics(sound)
-    check(replace(sound, objective=Objective(name="cost", unit=text)))
-    check(replace(sound, objective=Objective(name=text, unit="m")))
-    check(replace(sound, variables=(replace(sound.variables[0], unit=text), sound.variables[1])))
-    check(toy(lambda x, y, limit, ops: (x * y, (replace(row(x, upper=limit), name=text),))))
-    check(toy(lambda x, y, limit, ops: (x * y, (replace(row(x, upper=limit), labels=(text,)),))))
 
 
 @pytest.mark.parametrize("end", ["lower", "upper"])

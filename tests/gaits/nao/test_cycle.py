@@ -11,9 +11,9 @@ from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.robots import load_robot
+from nlp_gait.robots.tree import find_partner, mirror_sign
 from tests.evaluation import evaluated
 from tests.pinocchio_oracle import check_halves, check_standing, floating_model
-from tests.properties.mirror import JOINT_SIGNS, partner
 
 # Asked for at both switches; it holds to rounding, for every x.
 CONTINUITY = 1e-8
@@ -86,7 +86,8 @@ def mirrored_row(signals: Signals, name: str, row: int) -> Array:
     """Joint values with left and right exchanged."""
     columns = {joint: i for i, joint in enumerate(signals.joints)}
     values = signals.arrays[name][row]
-    return np.array([JOINT_SIGNS[joint] * values[columns[partner(joint)]] for joint in signals.joints])
+    robot, partners = load_robot("nao-v5"), {joint: find_partner(joint) for joint in signals.joints}
+    return np.array([mirror_sign(robot, *pair) * values[columns[pair[1]]] for pair in partners.items()])
 
 
 @pytest.mark.slow
