@@ -53,8 +53,11 @@ class JudgedGait:
         return dict(replace_nan(data))
 
 
-def judge_gait(gait: RecordedGait, *, in_engine: bool = True) -> JudgedGait:
-    """Judge a recorded gait, solve for the optimum of the same step and durations, and simulate the gait, if ``in_engine``."""
+def judge_gait(gait: RecordedGait, *, in_engine: bool = True, starts: int = STARTS) -> JudgedGait:
+    """Judge a recorded gait, solve for the optimum of the same step and durations, and simulate the gait, if ``in_engine``.
+
+    Zero starts leave the optimum out.
+    """
     notes: list[str] = []
     if gait.motion.mirrored:
         notes.append("the right foot is the stance foot: left and right are exchanged in all results")
@@ -62,7 +65,7 @@ def judge_gait(gait: RecordedGait, *, in_engine: bool = True) -> JudgedGait:
         notes.append(f"held, because they are not in the file: {', '.join(gait.motion.held)}")
     optimum = engine = None
     try:
-        optimum = _solve_optimum(gait)
+        optimum = _solve_optimum(gait, starts) if starts else None
     except GaitError as error:
         notes.append(f"no optimum of {gait.gait} for this step and duration: {error}")
     if in_engine:
@@ -75,9 +78,9 @@ def judge_gait(gait: RecordedGait, *, in_engine: bool = True) -> JudgedGait:
     )
 
 
-def _solve_optimum(gait: RecordedGait) -> Evaluation:
+def _solve_optimum(gait: RecordedGait, starts: int) -> Evaluation:
     problem = gait.make_planned()
-    solution = solve(problem, starts=STARTS)
+    solution = solve(problem, starts=starts)
     if not solution.converged:
         raise GaitError(solution.status)
     return evaluate(problem, solution.x)

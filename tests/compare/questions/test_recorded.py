@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.questions import recorded as module
 from compare.questions.recorded import judge_gait
 from nlp_gait import load
 from nlp_gait.export.formats import write_as
@@ -15,6 +14,7 @@ from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.nao.recorded import make_recorded_gait
 from nlp_gait.robots import load_robot
 from tests.compare.cli.calls import as_json, nlp_gait
+from tests.compare.records import DSP_X
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
@@ -29,27 +29,35 @@ def gait(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_command_judges_simulates_and_compares_with_the_optimum(gait: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def double_support(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("gait") / "dsp.csv"
+    problem = load("nao-dsp")
+    write_as("csv", path, Result(problem=problem, x=problem.check_x(DSP_X)), 20)
+    return path
+
+
+def test_the_command_judges_simulates_and_compares_with_the_optimum(double_support: Path, tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
-    found = as_json("evaluate", "--motion", gait, "--robot", "nao-v5", "--signals", tmp_path / "s.npz")
+    found = as_json("evaluate", "--motion", double_support, "--robot", "nao-v5", "--signals", tmp_path / "s.npz")
     own, best = found["recorded"]["indexes"], found["optimum"]["indexes"]
-    planned = load("nao-ssp")
-    expected = as_json("evaluate", "nao-ssp", "--x", ",".join(map(str, X)))["indexes"]
-    assert found["gait"] == "nao-ssp" and found["step_m"] == pytest.approx(0.06, abs=1e-6)
+    planned = load("nao-dsp")
+    expected = as_json("evaluate", "nao-dsp", "--x", ",".join(map(str, DSP_X.values())))["indexes"]
+    assert found["gait"] == "nao-dsp" and found["step_m"] == pytest.approx(0.06, abs=1e-6)
     assert own["power_W"] == pytest.approx(expected["power_W"], rel=1e-4) and best["power_W"] < own["power_W"]
-    assert found["optimum"]["x"]["single_support_time_s"] == pytest.approx(4.0, abs=1e-6)
+    assert found["optimum"]["x"]["double_support_time_s"] == pytest.approx(DSP_X["double_support_time_s"], abs=1e-6)
     assert not found["engine"]["fallen"]
     assert found["engine"]["predicted"]["mechanical_W"] > 0 and (tmp_path / "s.npz").stat().st_size
     assert set(planned.names) == set(found["optimum"]["x"])
 
 
-def test_tighter_limits_are_named(gait: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_solve_optimum", lambda *_: None)
-    shown = nlp_gait("evaluate", "--motion", gait, "--no-engine", "--set", "torque_change_limit_Nm=0.01").stdout
+def test_tighter_limits_are_named(double_support: Path) -> None:
+    call = ("evaluate", "--motion", double_support, "--no-engine", "--set", "torque_change_limit_Nm=0.01")
+    shown = nlp_gait(*call).stdout
     assert "Infeasible on the samples" in shown and "torque_change[" in shown and "In the engine" not in shown
 
 
-def test_missing_results_are_explained(gait: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_results_are_explained(gait: Path) -> None:
     """A step on the spot has no optimum; a torso that leans at the beginning is not played."""
     angles = read_joint_angles(gait, load_robot("nao-v5"))
     q = np.array(angles.q)
@@ -57,9 +65,7 @@ def test_missing_results_are_explained(gait: Path, monkeypatch: pytest.MonkeyPat
         0.1  # the torso leans over straight legs
     )
     leaning = make_recorded_gait(JointAngles(owner="leaning", joints=angles.joints, t=angles.t, q=q), gait="nao-ssp")
-    with monkeypatch.context() as patch:
-        patch.setattr(module, "_solve_optimum", lambda *_: None)
-        judged = judge_gait(leaning)
+    judged = judge_gait(leaning, starts=0)
     assert any("the torso leans by" in note for note in judged.notes) and judged.engine is None
     still = JointAngles(owner="still", joints=angles.joints, t=angles.t, q=np.tile(angles.q[0], (len(angles.t), 1)))
     standing = judge_gait(make_recorded_gait(still, gait="nao-ssp"), in_engine=False)
