@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import time
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -24,18 +25,15 @@ ROW = 7  # doubles of a box: four ends, bound, cut, depth
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """Return the checkpoint of a proof that was killed with some open boxes."""
-    file, patch = tmp_path_factory.mktemp("proof") / "open", pytest.MonkeyPatch()
+    """Return the checkpoint of a proof whose time ended with some open boxes."""
+    file, notes = tmp_path_factory.mktemp("proof") / "open", list[str]()
 
-    def kill(note: str) -> None:
-        if file.exists():
-            raise KeyboardInterrupt
+    def wait(note: str) -> None:
+        notes.append(note)
+        time.sleep(1.0 if len(notes) == 3 else 0.0)
 
-    with patch.context() as changed:
-        changed.setattr(branch_and_bound, "BATCH", 4)
-        changed.setattr(branch_and_bound, "CHECKPOINT_S", 0.0)
-        with pytest.raises(KeyboardInterrupt):
-            certify(PROBLEM, BEST, tolerance=1e-4, progress=kill, checkpoint=file)
+    certify(PROBLEM, BEST, tolerance=0.5)  # compiles
+    assert not certify(PROBLEM, BEST, tolerance=1e-4, time_limit_s=1.0, progress=wait, checkpoint=file).closed
     return file.read_bytes()
 
 
@@ -115,8 +113,14 @@ def test_a_damaged_or_forged_checkpoint_is_one_sentence(name: str, written: byte
     assert "\n" not in text and text.endswith("delete it to start the proof again") and len(text) < 400
 
 
-def test_a_killed_proof_continues_to_the_same_end(written: bytes, tmp_path: Path) -> None:
-    (tmp_path / "open").write_bytes(written)
+def test_a_killed_proof_continues_to_the_same_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def kill(note: str) -> None:
+        if (tmp_path / "open").exists():
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(branch_and_bound, "CHECKPOINT_S", 0.0)
+    with pytest.raises(KeyboardInterrupt):
+        certify(PROBLEM, BEST, tolerance=1e-4, progress=kill, checkpoint=tmp_path / "open")
     resumed, whole = (
         certify(PROBLEM, BEST, tolerance=1e-4, checkpoint=tmp_path / "open"),
         certify(PROBLEM, BEST, tolerance=1e-4),

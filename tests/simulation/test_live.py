@@ -69,10 +69,14 @@ def open_window(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
             return Window(list(keys), key_callback, pictures)
 
         viewer = SimpleNamespace(launch_passive=launch)
-        monkeypatch.setattr(live, "_check_display", lambda: None)
+        calls = dict.fromkeys(("window_hint", "default_window_hints", "destroy_window"), lambda *_: None)
+        monkeypatch.setenv("DISPLAY", ":0")
+        monkeypatch.setitem(
+            sys.modules, "glfw", SimpleNamespace(init=lambda: True, create_window=lambda *_: True, VISIBLE=0, **calls)
+        )
         monkeypatch.setitem(sys.modules, "mujoco.viewer", viewer)
         monkeypatch.setattr(mujoco, "viewer", viewer, raising=False)
-        monkeypatch.setattr(live.time, "sleep", lambda seconds: None)
+        monkeypatch.setattr("time.sleep", lambda seconds: None)
 
     return replace
 
