@@ -33,7 +33,7 @@ figure = solution.plot()
 figure
 
 # %%
-# A study, and its runs as a data frame; a study with a folder has `study.to_frame()`.
+# A study, and its runs as a data frame.
 
 algorithms = {"ipopt": Stop(), "pso": Stop(evaluations=2000)}
 tasks = [

@@ -20,12 +20,11 @@ from functools import cache, lru_cache, partial
 from importlib.metadata import entry_points
 from pathlib import Path
 from symtable import symtable
-from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Literal, NamedTuple, TypeVar
 
 from nlp_gait.errors import GaitError, UserCodeError, unknown
-from nlp_gait.files import check_path, make_writable_folder, read_bytes, write_bytes
+from nlp_gait.files import check_path, read_bytes
 
 T = TypeVar("T")
 Kind = Literal["problem", "algorithm", "limit", "paper"]
@@ -45,17 +44,6 @@ IMPORTS_ALL = re.compile(rb"\bimport\s*\*")
 HAS_DOCSTRING = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 _allowed: dict[str, str] = {}
-# Files that another machine has sent, by the place that a reference names.
-_copies: dict[str, str] = {}
-_make_folder_of_copies = cache(lambda: TemporaryDirectory(prefix="nlp-gait-code-"))  # deleted when the process ends
-
-
-class PackedCode(NamedTuple):
-    """The files of a reference, for a process that may not see the folders of this one."""
-
-    home: str  # place that the reference names
-    file: str  # name of that file
-    contents: Mapping[str, bytes]  # of it and of the files that it imports, by path in its folder
 
 
 class CodeReference(NamedTuple):
@@ -110,7 +98,6 @@ def parse_reference(text: str, kind: Kind) -> CodeReference:
     if is_program(text):
         return CodeReference(_find_program_file(text), text)
     home, _, name = find_entry_points(kind).get(text, text).rpartition(":")
-    home = _copies.get(home, home)
     return CodeReference(os.path.abspath(home) if home.endswith(ENDING) else home, name)
 
 
@@ -143,7 +130,6 @@ def parse_command(text: str) -> tuple[str, ...]:
         raise UserCodeError(f"{text!r}: {error}; write {PROGRAM} and a command as in a shell") from error
     if not words:
         raise UserCodeError(f"{text!r} names no program; write for example {PROGRAM}octave-cli --quiet my_ga.m")
-    words = tuple(_copies.get(word, word) for word in words)
     if shutil.which(words[0]) is None:
         raise UserCodeError(f"{text!r}: no program {words[0]!r} on this machine; install it, or give its path")
     return words
@@ -158,27 +144,6 @@ def _find_program_file(text: str) -> str:
 def _find_own_word(words: Sequence[str]) -> str | None:
     programs = (word for word in words if os.path.isfile(word) and not (word == words[0] and os.path.isabs(word)))
     return next(programs, None)
-
-
-def pack_code(text: str, kind: Kind) -> PackedCode | None:
-    """Return the files of a reference; None for a module or an installed program, which another machine must have itself."""
-    home = _find_own_word(parse_command(text)) if is_program(text) else text.rpartition(":")[0]
-    if home is None or not parse_reference(text, kind).is_file:
-        return None
-    path = Path(os.path.abspath(home))
-    files = _read_with_imports(path)
-    return PackedCode(home, path.name, {str(file.relative_to(path.parent)): content for file, content in files.items()})
-
-
-def unpack_code(packed: PackedCode) -> None:
-    """Use the files of a reference that another machine has packed wherever this process meets the reference."""
-    digest = hashlib.sha256(repr(sorted(packed.contents.items())).encode()).hexdigest()[:16]
-    folder = Path(_make_folder_of_copies().name) / digest
-    for name, content in packed.contents.items():
-        path = make_writable_folder((folder / name).parent) / Path(name).name
-        if not path.exists():
-            write_bytes(path, content).chmod(0o700)  # it may be a program
-    _copies[packed.home] = str(folder / packed.file)
 
 
 def hash_source(text: str, kind: Kind) -> str:

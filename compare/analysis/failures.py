@@ -1,10 +1,6 @@
 """Runs without a result, or without a known number of evaluations."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 from compare.analysis.comparison import Comparison
-from compare.study.record import RunRecord
 
 
 def describe_unknown(comparison: Comparison) -> list[str]:
@@ -17,32 +13,13 @@ def describe_unknown(comparison: Comparison) -> list[str]:
     ]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Failure:
-    """Failed runs of one solver on one problem."""
-
-    problem: str
-    solver: str
-    failed: int  #: number of runs without a point
-    runs: int
-    reason: str  #: status of the first
-
-    @property
-    def sentence(self) -> str:
-        """The failures as one sentence."""
-        runs = f"{self.failed} of {self.runs} runs"
-        return f"{self.problem}, {self.solver}: {runs} have no result; the first {self.reason}"
-
-
-def find_failures(records: Sequence[RunRecord]) -> list[Failure]:
-    """Return the solvers with failed runs, in the order of their records."""
-    groups: dict[tuple[str, str], list[RunRecord]] = {}
-    for record in records:
-        groups.setdefault((record.problem, record.solver), []).append(record)
-    failures = []
-    for (problem, solver), group in groups.items():
-        failed = [record for record in group if not record.x]
+def describe_failures(comparison: Comparison) -> list[str]:
+    """Return a sentence for each solver with runs that have no result."""
+    sentences = []
+    for solver in comparison.solvers:
+        failed = [record for record in solver.records if not record.x]
         if failed:
-            status = failed[0].status
-            failures.append(Failure(problem=problem, solver=solver, failed=len(failed), runs=len(group), reason=status))
-    return failures
+            runs = f"{len(failed)} of {len(solver.records)} runs"
+            first = failed[0].status
+            sentences.append(f"{comparison.problem}, {solver.name}: {runs} have no result; the first {first}")
+    return sentences

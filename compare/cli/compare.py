@@ -11,7 +11,7 @@ from typer import Argument, Option
 
 from compare.analysis.columns import PRINTED, format_rows, summarise
 from compare.analysis.comparison import Comparison, compare_problems
-from compare.analysis.failures import describe_unknown, find_failures
+from compare.analysis.failures import describe_failures, describe_unknown
 from compare.analysis.headline import write_headlines
 from compare.analysis.live_gaps import LiveGaps
 from compare.analysis.tuning import tune_solvers
@@ -143,12 +143,11 @@ def compare(
     imported = read_imported_records(out, records)
     records += imported.records
     written = write_report(out, records, read_manifest(out), excluded=imported.excluded)
-    failures = find_failures(records)
-    for failure in failures:
-        say_error(failure.sentence)
-    lost = ", ".join(failure.solver for failure in failures if failure.failed == failure.runs)
-    remedy = f"without any result: {lost}; fix the cause, and delete the failed records to run them again"
     comparisons = compare_problems(records)
+    for sentence in (sentence for comparison in comparisons for sentence in describe_failures(comparison)):
+        say_error(sentence)
+    lost = ", ".join(s.name for c in comparisons for s in c.solvers if not any(r.x for r in s.records))
+    remedy = f"without any result: {lost}; fix the cause, and delete the failed records to run them again"
     return Output(
         data={"problems": summarise_problems(comparisons), "runs": [_encode_run(record) for record in records]},
         parts=[*_tabulate_runs(comparisons), *describe_summaries(comparisons)],
@@ -231,9 +230,6 @@ def describe_summaries(comparisons: Sequence[Comparison]) -> Iterator[str | Rows
     """Yield the table of solvers for each problem."""
     for comparison in comparisons:
         yield Rows(f"{comparison.problem}: judged by the exact functions", *format_rows(comparison, PRINTED))
-        failures = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in find_failures(comparison.records)]
-        if failures:
-            yield Rows("Failed runs", ("solver", "failed", "reason of the first"), failures)
         for sentence in [*describe_unknown(comparison), *([comparison.power] if comparison.power else [])]:
             yield f"{comparison.problem}, {sentence}"
 

@@ -1,9 +1,7 @@
 """Where numbers come from: settings and seeds of solvers, shipped best known values."""
 
 import json
-from collections.abc import Iterable, Mapping
-from functools import cache
-from typing import Any
+from collections.abc import Iterable
 
 from compare.analysis.best_known import compute_gap
 from compare.analysis.record_statistics import find_best_known
@@ -12,12 +10,7 @@ from compare.report.document import Prose, Table, make_text_table
 from compare.study.description import describe_solver, list_described_names
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
-from compare.study.task import GRADIENT_SOLVERS, IPOPT, describe_settings, list_solvers
-from metaheuristics.errors import SearchError
-from metaheuristics.registry import ALGORITHMS, make_algorithm
 from nlp_gait.backends.identity import hash_json, make_key
-from nlp_gait.backends.solvers.registry import make_solver
-from nlp_gait.errors import GaitError
 
 # The one explanation of each term: of a column by its heading, and in the glossary at the end of a page.
 GLOSSARY = {
@@ -51,8 +44,10 @@ def make_solver_table(records: Iterable[RunRecord]) -> Table:
         seeds = f"{min(r.seed for r in group)} to {max(r.seed for r in group)}"
         title = describe_solver(solver).title if solver in list_described_names() else "-"
         counts = str(len(group)), str(len({r.problem for r in group}))
-        rows.append((solver, *compare_with_defaults(run), seeds, *counts, title))
-    return make_text_table(("solver", *SETTINGS, "seeds", "runs", "problems", "what"), rows, prose=True)
+        given, used = (format_settings(settings) or "-" for settings in (run.inputs.settings, run.settings))
+        rows.append((solver, describe_budget(run), given, used, seeds, *counts, title))
+    header = ("solver", "evaluations allowed", "given settings", "all settings", "seeds", "runs", "problems", "what")
+    return make_text_table(header, rows, prose=True)
 
 
 def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
@@ -74,58 +69,10 @@ def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
     return make_text_table(header, rows, "Best known values", prose=True)
 
 
-SETTINGS = ("evaluations allowed", "changed settings", "default settings")
-
-
-def compare_with_defaults(record: RunRecord) -> tuple[str, str, str]:
-    """Return a run's budget, its solver's settings that differ from the defaults, and the others, under ``SETTINGS``."""
-    settings, defaults = dict(record.settings), _find_defaults(record)
-    if defaults is None:
-        return describe_budget(record), format_settings(settings) or "-", "unknown"
-    handling = settings.pop("handling", None)
-    if isinstance(handling, Mapping):
-        settings["constraint handling"] = handling.get("kind") if handling.keys() == {"kind"} else handling
-        defaults = {**defaults, "constraint handling": "Deb"}
-    if record.inputs.polish:
-        defaults = {**defaults, IPOPT: _load_defaults(IPOPT)}
-    given = record.inputs.settings
-    changed = {
-        name: value
-        for name, value in settings.items()
-        if name in defaults
-        and format_settings(value) != format_settings(defaults[name])  # a stored tuple is a list
-        and (name in given or defaults[name] is not None)  # None: recorded as the solver chose it
-    }
-    texts = [
-        f"{name}: {format_settings(value)} (default {format_settings(defaults[name])})"
-        for name, value in changed.items()
-    ]
-    others = {name: value for name, value in settings.items() if name not in changed and name != "kind"}
-    return describe_budget(record), ", ".join(texts) or "none", format_settings(others) or "-"
-
-
 def describe_budget(record: RunRecord) -> str:
     """Return the number of evaluations that a run was allowed."""
     budget = record.inputs.stop.get("evaluations")
     return f"{budget:,}".replace(",", "\u202f") if budget else "no limit"
-
-
-def _find_defaults(record: RunRecord) -> Mapping[str, Any] | None:
-    """Return the default settings of a run's solver; None for user code and imported results."""
-    solver: str | Mapping[str, Any] | None = record.inputs.solver
-    if isinstance(solver, Mapping):  # settings of a search, by its class
-        kind = solver.get("kind")
-        solver = next((name for name in ALGORITHMS if _load_defaults(name).get("kind") == kind), None)
-    known = isinstance(solver, str) and solver in list_solvers() and not record.inputs.imported
-    return (_load_defaults(str(solver)) or None) if known else None
-
-
-@cache
-def _load_defaults(name: str) -> Mapping[str, Any]:
-    try:
-        return make_solver(name).to_dict() if name in GRADIENT_SOLVERS else describe_settings(make_algorithm(name))
-    except (GaitError, SearchError):  # a package is not installed
-        return {}
 
 
 def format_settings(settings: object) -> str:

@@ -1,14 +1,14 @@
-"""Runs on the workers of a Dask scheduler, to which the files of user code are sent."""
+"""Runs on the workers of a Dask scheduler."""
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import os
+from collections.abc import Iterator, Mapping
 
 from compare.study.record import RunRecord
 from compare.study.run_task import MOST_REASON, try_task
 from compare.study.task import Task
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import convert_errors
-from nlp_gait.user_code import Kind, PackedCode, is_user_code, pack_code, unpack_code
 
 CONNECT_TIMEOUT = "10s"
 
@@ -18,7 +18,8 @@ def run_on_cluster(
 ) -> Iterator[tuple[int, RunRecord]]:
     """Run tasks as ``run_tasks`` on the workers of a scheduler, and yield the key and the record of each as it finishes.
 
-    The scheduler repeats the runs of a worker that dies.
+    The scheduler repeats the runs of a worker that dies. Files of user code and robots must have the same paths for the workers;
+    relative ones start in the working folder of this process.
 
     Raises:
         InputError: no scheduler answers at the address, or Dask is not installed.
@@ -33,10 +34,9 @@ def run_on_cluster(
         logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are reported in one sentence
     with convert_errors(f"no Dask scheduler answers at {scheduler!r}", InputError, "start one with `dask scheduler`"):
         client = Client(scheduler, timeout=CONNECT_TIMEOUT)
-    code = _pack_code(task for task, _ in tasks.values())
     with client:
         try:
-            futures = {client.submit(_try_task, code, *call, pure=False): key for key, call in tasks.items()}
+            futures = {client.submit(_try_task, os.getcwd(), *call, pure=False): key for key, call in tasks.items()}
             for future in as_completed(futures):
                 yield futures[future], future.result()
         except Exception as error:  # of Dask, or of the worker's own Python, which may lack a package
@@ -47,19 +47,7 @@ def run_on_cluster(
             ) from error
 
 
-def _try_task(code: Sequence[PackedCode], task: Task, search: RunRecord | None) -> RunRecord:
-    for packed in code:
-        unpack_code(packed)
+def _try_task(folder: str, task: Task, search: RunRecord | None) -> RunRecord:
+    if os.path.isdir(folder):
+        os.chdir(folder)
     return try_task(task, search)
-
-
-def _pack_code(tasks: Iterable[Task]) -> tuple[PackedCode, ...]:
-    """Return the files of all user code that tasks name."""
-    packed: dict[tuple[str, Kind], PackedCode | None] = {}
-    for task in tasks:
-        names: list[tuple[object, Kind]] = [(task.problem.name, "problem")]
-        names += [(task.solver, "algorithm")] if task.is_user_code else []
-        for name, kind in names:
-            if isinstance(name, str) and is_user_code(name, kind) and (name, kind) not in packed:
-                packed[name, kind] = pack_code(name, kind)
-    return tuple(each for each in packed.values() if each is not None)

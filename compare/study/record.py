@@ -24,7 +24,7 @@ from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
-from nlp_gait.notebook import format_html_table, import_pandas
+from nlp_gait.notebook import import_pandas
 from nlp_gait.proofs.guarantee import Guarantee
 
 SCHEMA = 5
@@ -149,13 +149,6 @@ class RunRecord:
 
     def __repr__(self) -> str:
         return f"<RunRecord of {self.solver} on {self.problem}, run {self.run}: {self.objective_text}>"
-
-    def _repr_html_(self) -> str:
-        calls = ", ".join(f"{kind} {count}" for kind, count in self.evaluations.items())
-        note = f"{self.status}; seed {self.seed}; calls {calls}; {self.time_s.solve:.3g} s"
-        return format_html_table(
-            repr(self)[1:-1], ("variable", "value"), [(n, f"{v:.6g}") for n, v in self.x.items()], note
-        )
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data with a schema version; numbers that are not finite become null."""

@@ -6,12 +6,11 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from compare.study.cluster import run_on_cluster
 from compare.study.evidence import check_records
 from compare.study.origin import hash_installed_code
-from compare.study.record import RunRecord, check_readable, make_frame
+from compare.study.record import RunRecord, check_readable
 from compare.study.record_files import find_record, locate_record, name_run, write_record
 from compare.study.run_task import PLANNED_RUNS, try_task
 from compare.study.settings import list_runs
@@ -19,7 +18,6 @@ from compare.study.task import Task, check_task
 from nlp_gait.errors import GaitError, InputError, NoWorkersError, OutputError, WorkerError
 from nlp_gait.files import convert_errors, make_writable_folder, remove_leftovers
 from nlp_gait.interrupts import Interrupted, delay_interrupts, remember_interrupts
-from nlp_gait.notebook import format_html_table
 from nlp_gait.processes import run_in_processes
 from nlp_gait.progress import Progress
 
@@ -92,27 +90,13 @@ class Study:
                 f"two solvers of the study are called {solver!r} on {problem!r}; give them different labels"
             )
 
-    @property
-    def _groups(self) -> Counter[tuple[str, str]]:
-        return Counter((task.problem.title, task.title) for task in self.tasks)
-
     def __repr__(self) -> str:
-        problems, solvers = (", ".join(dict.fromkeys(group[i] for group in self._groups)) for i in (0, 1))
+        problems, solvers = (
+            dict.fromkeys(t.problem.title for t in self.tasks),
+            dict.fromkeys(t.title for t in self.tasks),
+        )
         place = "without a folder" if self.folder is None else f"in {str(self.folder)!r}"
-        return f"<Study of {problems} by {solvers}: {len(self.tasks)} runs, {place}>"
-
-    def _repr_html_(self) -> str:
-        rows = [(problem, solver, str(runs)) for (problem, solver), runs in self._groups.items()]
-        return format_html_table(repr(self)[1:-1], ("problem", "solver", "runs"), rows)
-
-    def to_frame(self) -> Any:
-        """Return the finished runs as a pandas frame, see ``make_frame``; raises InputError for a study without a folder."""
-        if self.folder is None:
-            raise InputError(
-                "this study has no folder; set one, or call make_frame(records) on the result of run_study"
-            )
-        records, _ = _load_records(self)
-        return make_frame([records[index] for index in sorted(records)])
+        return f"<Study of {', '.join(problems)} by {', '.join(solvers)}: {len(self.tasks)} runs, {place}>"
 
 
 def run_study(
@@ -147,8 +131,11 @@ def run_study(
         on_stored(len(records))
     try:
         for index, record in _run_missing(study, records):
-            if record.inputs.code != hash_installed_code():
-                raise WorkerError("a worker has another version of nlp-gait than this machine; install the same")
+            is_elsewhere = study.scheduler is not None and record.inputs.key != study.tasks[index].inputs().key
+            if record.inputs.code != hash_installed_code() or is_elsewhere:
+                raise WorkerError(
+                    "a worker has another version of nlp-gait or of your code than this machine; install the same"
+                )
             with delay_interrupts():
                 if study.folder is not None:
                     _write(record, study.folder, len(records))

@@ -1,4 +1,4 @@
-"""A study on a real Dask cluster on loopback: user code reaches its workers, and a killed worker or scheduler loses no run."""
+"""A study on a real Dask cluster on loopback: its workers find user code, and a killed worker or scheduler loses no run."""
 
 import os
 import signal
@@ -70,7 +70,7 @@ def search(evaluate, lower, upper, evaluations, seed):
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of Dask's own clean-up
-def test_user_code_reaches_workers_and_killed_processes_lose_no_run(
+def test_workers_find_user_code_and_killed_processes_lose_no_run(
     cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from distributed import Client
