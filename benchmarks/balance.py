@@ -18,12 +18,13 @@ from time import process_time
 
 import numpy as np
 
+from benchmarks.engine.gaits import DIRECTIONS
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.formulation import load_result
 from nlp_gait.simulation.drive import Drive, choose_feedback
 from nlp_gait.simulation.mjcf import Bumps
 from nlp_gait.simulation.plan import Plan, make_plan
-from nlp_gait.simulation.simulate import DIRECTIONS, TIME_STEP, Conditions, Push, Run
+from nlp_gait.simulation.simulate import TIME_STEP, Conditions, Push, Run
 
 FEEDBACKS = ("none", "balance")
 INSTANTS = 12  # of pushes, even over the inner steps

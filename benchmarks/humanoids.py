@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 import nlp_gait
+from benchmarks.engine.gaits import DIRECTIONS
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.plan_walk import MARGINS, WalkSettings
@@ -31,7 +32,7 @@ from nlp_gait.formulation import load_result
 from nlp_gait.simulation.drive import Drive, choose_feedback
 from nlp_gait.simulation.measurements import measure_walk
 from nlp_gait.simulation.plan import Plan, make_plan
-from nlp_gait.simulation.simulate import DIRECTIONS, Push, Run, simulate_plan
+from nlp_gait.simulation.simulate import Push, Run, simulate_plan
 
 Row = dict[str, Any]
 

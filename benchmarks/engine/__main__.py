@@ -19,7 +19,6 @@ TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "ranking": agreement.ranking,
     "published": agreement.published,
     "gains": sensitivity.gains,
-    "survival": sensitivity.survival,
     "disturbed": feedback.disturbed,
     "feedback": feedback.settings,
     "rotors": rotors.rotors,

@@ -7,14 +7,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from benchmarks.engine.agreement import STEPS
-from benchmarks.engine.gaits import optimal_cycles
+from benchmarks.engine.gaits import DIRECTIONS, optimal_cycles
 from benchmarks.engine.markdown import cells, header
 from benchmarks.engine.sensitivity import SPEED
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.measurements import Walk, measure_walk
 from nlp_gait.simulation.plan import make_plan
-from nlp_gait.simulation.simulate import DIRECTIONS, Conditions, Push, simulate_plan
+from nlp_gait.simulation.simulate import Conditions, Push, simulate_plan
 
 SLOPE = math.radians(3.0)
 IMPULSE = 1.0  # [N s]

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from benchmarks.engine.agreement import STEPS, format_energies, simulate_walk
-from benchmarks.engine.gaits import PAPER, optimal_cycles, optimum, phase_gaits
+from benchmarks.engine.gaits import PAPER, optimal_cycles, optimum
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.simulation import measurements, mjcf, simulate
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import measure
 from nlp_gait.simulation.plan import make_plan
-from nlp_gait.simulation.simulate import DIRECTIONS, measure_robustness, simulate_plan
+from nlp_gait.simulation.simulate import simulate_plan
 
 SPEED = 0.05  # [m/s]
 VARIANTS = {
@@ -62,17 +62,3 @@ def gains() -> Iterator[str]:
     for step_s in (0.001, 0.00025, 0.0001):
         with engine_step(step_s):
             yield row(f"engine step {1e3 * step_s:g} ms", Drive())
-
-
-def survival() -> Iterator[str]:
-    """What the optima and the paper's gaits survive in open loop, one disturbance at a time."""
-    ways = " / ".join(DIRECTIONS)
-    yield header("gait", f"push N s {ways}", f"slope deg, rising {ways}", "friction 0.3 to 1.0", "mass -10 % / +10 %")
-    for name in PAPER:
-        for label, gait in phase_gaits(name).items():
-            r = measure_robustness(make_plan(gait))
-            pushes, slopes = (" / ".join(f"{v:g}" for v in values.values()) for values in (r.push_Ns, r.slope_deg))
-            falls = [f"{value:g}" for value, survived in r.friction.items() if not survived]
-            masses = " / ".join("stays up" if survived else "falls" for survived in r.mass_factor.values())
-            frictions = f"falls at {', '.join(falls)}" if falls else "stays up"
-            yield cells(f"{name}, {label}", pushes, slopes, frictions, masses)

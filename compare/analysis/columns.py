@@ -9,7 +9,7 @@ from statistics import median
 from typing import Any
 
 from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.record_statistics import TARGETS, bootstrap_interval
+from compare.analysis.record_statistics import TARGETS
 from compare.analysis.units import format_number, with_unit
 
 FORMATS: dict[str, Callable[[Any, Comparison, SolverRuns], str]] = {
@@ -17,7 +17,6 @@ FORMATS: dict[str, Callable[[Any, Comparison, SolverRuns], str]] = {
     "share": lambda value, comparison, solver: f"{value}/{len(solver.records)}",
     "gap": lambda value, comparison, solver: comparison.format_gap(value),
     "objective": lambda value, comparison, solver: with_unit(value, comparison.objective.unit),
-    "interval": lambda value, comparison, solver: f"{value[0]:.6f} to {value[1]:.6f}",
 }
 
 
@@ -83,13 +82,6 @@ def compute_of_feasible(
     return comparison.value(statistic(solver.feasible)) if solver.feasible else None
 
 
-def compute_median_interval(comparison: Comparison, solver: SolverRuns) -> tuple[float, ...] | None:
-    """Return the 95 % bootstrap interval of the median objective of the feasible runs."""
-    if not solver.feasible:
-        return None
-    return tuple(sorted(comparison.value(end) for end in bootstrap_interval([solver.feasible], median)))
-
-
 def compute_of_records(
     statistic: Callable[[list[float]], float], name: str, comparison: Comparison, solver: SolverRuns
 ) -> float:
@@ -134,7 +126,6 @@ JUDGEMENT = (
     Column("best", partial(compute_of_feasible, min), "objective"),
     Column("median", partial(compute_of_feasible, median), "objective"),
     Column("worst", partial(compute_of_feasible, max), "objective"),
-    Column("median interval", compute_median_interval, "interval"),
 )
 EFFORT = (
     Column("evaluations", compute_median_evaluations, "count"),

@@ -4,7 +4,7 @@ Tests take costs to be minimised, infinite where a run found nothing feasible.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,8 +135,6 @@ def compute_band(costs: Sequence[Array], gaps: Sequence[Array], grid: Array) -> 
 
 
 MOST_EXACT = 8  # values of the smaller sample
-RESAMPLES = 2000
-SEED = 0  # intervals are repeatable
 
 
 def compute_rank_sum(a: Sequence[float], b: Sequence[float]) -> float:
@@ -226,21 +224,3 @@ def approximate_rank_sum(a: Sequence[float], b: Sequence[float]) -> RankSum:
     u = float(two_sided.statistic)
     z = math.copysign(float(norm.isf(two_sided.pvalue / 2)), u - m * n / 2)
     return RankSum(rank_sum=u + m * (m + 1) / 2, z=z, p_two_sided=float(two_sided.pvalue), p_less=float(less.pvalue))
-
-
-def bootstrap_interval(
-    columns: Sequence[Sequence[float]], statistic: Callable[..., float], level: float = 0.95
-) -> tuple[float, float]:
-    """Percentile bootstrap interval of a statistic of columns (R,) over runs, drawn with all their columns.
-
-    Source:
-        Efron, Tibshirani (1993), An introduction to the bootstrap, chapter 13.
-    """
-    data = [np.asarray(column, dtype=float) for column in columns]
-    draws = np.random.default_rng(SEED).integers(len(data[0]), size=(RESAMPLES, len(data[0])))
-    values = np.sort([statistic(*(column[rows] for column in data)) for rows in draws])
-    return _find_quantile(values, (1.0 - level) / 2.0), _find_quantile(values, (1.0 + level) / 2.0)
-
-
-def _find_quantile(ascending: Array, share: float) -> float:
-    return float(ascending[min(int(np.floor(share * len(ascending))), len(ascending) - 1)])

@@ -208,9 +208,7 @@ def robust(
 def sweep(
     *,
     over: Annotated[list[str], Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")],
-    algorithm: Annotated[str, Option(help="ipopt, or a search algorithm.")] = "ipopt",
     starts: options.Starts = 5,
-    evaluations: options.Evaluations = 10_000,
     seed: options.Seed = 0,
     engine: Annotated[bool, Option("--engine", help=ENGINE)] = False,
     steps: Annotated[int, Option(min=1, max=1000, help="With --engine: number of steps.")] = 10,
@@ -230,8 +228,8 @@ def sweep(
     axes = [parse_axis(text) for text in over]
     if problem.name in CYCLES and any(axis.name == SPEED for axis in axes):
         problem = replace(problem, values=["objective=power", *(problem.values or ())])
-    effort = {"starts": starts, "evaluations": evaluations, "seed": seed, "steps": steps if engine else 0}
-    return run_question(Sweep(problem=problem.load(), axes=axes, algorithm=algorithm, **effort), out)
+    effort = {"starts": starts, "seed": seed, "steps": steps if engine else 0}
+    return run_question(Sweep(problem=problem.load(), axes=axes, **effort), out)
 
 
 def run_question(question: Question[Any], out: Path) -> Output:

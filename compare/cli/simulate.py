@@ -22,7 +22,7 @@ from nlp_gait.simulation.video import Frame, check_frames, check_video_path, wri
 if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.measurements import ClimbMeasurements, Measurements, Walk
-    from nlp_gait.simulation.simulate import Conditions, Push, Robustness, Run
+    from nlp_gait.simulation.simulate import Conditions, Push, Run
 
 DRIVE = (
     "feed-forward: set-points every 10 ms, linear between them, planned velocity and torque fed forward. held: each held for "
@@ -117,9 +117,6 @@ def simulate(
     sole: Annotated[str, Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     world: ConditionOptions,
     drive_options: DriveOptions,
-    robustness: Annotated[
-        bool, Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
-    ] = False,
 ) -> Output:
     """Simulate a gait in MuJoCo (extra `sim`), open loop or with feedback, and compare it with the model's predictions.
 
@@ -142,7 +139,7 @@ def simulate(
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
     from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, list_frames, make_skeleton
-    from nlp_gait.simulation.simulate import SETTLE_TIME, Run, measure_robustness, prepare
+    from nlp_gait.simulation.simulate import SETTLE_TIME, Run, prepare
 
     load_mujoco(pictures=video is not None)
     if video is not None:
@@ -185,18 +182,7 @@ def simulate(
     ]
     if climb is not None:
         parts.append(_describe_climb(climb))
-    interrupted = ""
-    if robustness:
-        try:
-            survival = measure_robustness(plan, drive)
-            data["robustness"] = asdict(survival)
-            parts += _describe_survival(survival)
-            if folder is not None:
-                write_json(folder / "report.json", replace_nan(data))
-        except KeyboardInterrupt:
-            where = "printed" if folder is None else f"stored in {folder}"
-            interrupted = f"interrupted in the tests of robustness; the simulation is {where}"
-    return Output(data=data, parts=parts, written=written, failures=failures, interrupted=interrupted)
+    return Output(data=data, parts=parts, written=written, failures=failures)
 
 
 def _watch(simulation: Run) -> tuple[list[Push], list[str]]:
@@ -255,14 +241,6 @@ def _describe_climb(climb: ClimbMeasurements) -> str:
         f"Climbs {stairs} stairs; landing errors [mm] {errors} (less than half a tread, {1e3 * climb.half_tread_m:.0f}, "
         f"counts); the hip rises by [mm] {rises} (planned {planned})"
     )
-
-
-def _describe_survival(survival: Robustness) -> Iterator[str]:
-    for title, largest in (("push", survival.push_Ns), ("slope", survival.slope_deg)):
-        values = ", ".join(f"{direction} {value:g}" for direction, value in largest.items())
-        yield f"Largest {title} survived [{'N s' if title == 'push' else 'degrees'}]: {values}"
-    for title, outcomes in (("friction", survival.friction), ("mass factor", survival.mass_factor)):
-        yield f"{title}: " + ", ".join(f"{value:g} {'stays up' if up else 'falls'}" for value, up in outcomes.items())
 
 
 def _describe_course(walk: Walk, open_loop: bool) -> str:

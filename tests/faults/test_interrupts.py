@@ -23,15 +23,13 @@ from compare.papers.paper_runs import Effort, Runner
 from compare.questions import robust_gait, sweep, variants
 from compare.study.record import read_record
 from compare.study.store import Computation
-from nlp_gait.backends.kernel.compiled import CompiledObjective
 from nlp_gait.backends.solvers.solver import IterationWatch
 from nlp_gait.interrupts import (
     Interrupted,
 )
-from tests.compare.records import DSP_X
 from tests.faults.processes import ROOT, start, wait_for
 
-SWEEP, PSO = "sweep walk12 --over step_length_m=0.05:0.12:30 --starts 1", " --algorithm pso --evaluations 500"
+SWEEP = "sweep walk12 --over step_length_m=0.05:0.12:30 --starts 1"
 LIFTS, MOTORS = "sweep walk12 --over foot_lift_m=0.01,0.02 --starts 1", "variants --over motors --starts 1"
 
 
@@ -92,7 +90,6 @@ NOTHING = r"; (\d) finished results are stored in .*"
     ("owner", "name", "calls", "line", "said", "table"),
     [
         (IterationWatch, "eval", 60, SWEEP, rf"after (\d+) of 30 points, not all.*{KEPT}", "step_length_m-ipopt"),
-        (CompiledObjective, "__call__", 30, SWEEP + PSO, r"after (\d+) of 30 points" + KEPT, "step_length_m-pso"),
         (questions, "add_session", 1, LIFTS, "at the end" + KEPT, "foot_lift_m-ipopt"),
         (variants, "solve", 2, MOTORS + " --set intervals=3", r"after (1) of 8 variants" + KEPT, "variants"),
         (sweep, "solve_both_ways", 1, LIFTS, "after 0 of 4 solves" + NOTHING, ""),
@@ -144,20 +141,6 @@ def test_reproduce_reports_its_stored_results(tmp_path: Path, monkeypatch: pytes
     done = run("reproduce", "nao", "--out", str(tmp_path))
     assert f"1 finished results are stored in {tmp_path}; rerun the command to continue" in done.stderr
     assert [path.name.partition("-")[0] for path in (tmp_path / "store").iterdir()] == ["one"]
-
-
-@pytest.mark.slow
-def test_simulate_keeps_the_simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("mujoco")
-    from nlp_gait.simulation import simulate
-
-    gait = tmp_path / "gait.json"
-    gait.write_text(json.dumps({"problem": "nao-dsp", "x": DSP_X}))
-    monkeypatch.setattr(simulate, "measure_robustness", lambda *_: signal.raise_signal(signal.SIGINT))
-    done = run("simulate", str(gait), "--robustness", "--out", str(tmp_path))
-    assert f"interrupted in the tests of robustness; the simulation is stored in {tmp_path}" in done.stderr
-    assert {"report.json", "model.xml", "simulation.npz"} <= {path.name for path in tmp_path.iterdir()}
-    assert "robustness" not in json.loads((tmp_path / "report.json").read_text())
 
 
 PRESSED_AT_IMPORT = """

@@ -13,10 +13,8 @@ from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import measure  # noqa: E402
 from nlp_gait.simulation.plan import make_plan  # noqa: E402
 from nlp_gait.simulation.simulate import (  # noqa: E402  # noqa: E402
-    DIRECTIONS,
     Conditions,
     Push,
-    measure_robustness,
     simulate_plan,  # noqa: E402
 )
 
@@ -109,28 +107,6 @@ def test_torque_limits_are_named_and_hold(simulated):
     limits = np.array([drive.torque_limit(plan.robot.joint(name)) for name in plan.joints])
     assert (np.abs(trace.torque) <= limits + 1e-9).all()
     assert m.saturated and all(0.0 < share <= 1.0 for share in m.saturated.values())
-
-
-def test_robustness_finds_the_first_fall(simulated, monkeypatch):
-    """The sweep itself, against a fake robot that falls beyond known limits."""
-    from nlp_gait.simulation import simulate as module
-
-    class FakeTrace:
-        def __init__(self, fell):
-            self.fell_at_s = 1.0 if fell else None
-
-    def fake(plan, conditions, drive):
-        push = (0.0, 0.0) if conditions.push is None else conditions.push.impulse_Ns
-        fell = push[0] > 0.31 or push[1] < -0.12 or conditions.friction < 0.45 or conditions.mass_factor > 1.0
-        return FakeTrace(fell or conditions.slope_rad[0] > math.radians(2.2))
-
-    monkeypatch.setattr(module, "simulate_plan", fake)
-    found = measure_robustness(simulated("dsp optimum")[0])
-    assert found.undisturbed
-    assert found.push_Ns == {"forward": 0.3, "backward": module.LARGEST_PUSH, "left": module.LARGEST_PUSH, "right": 0.1}
-    assert found.slope_deg["forward"] == 2.0 and set(found.slope_deg) == set(DIRECTIONS)
-    assert [value for value, survived in found.friction.items() if not survived] == [0.3, 0.4]
-    assert found.mass_factor == {0.9: True, 1.1: False}
 
 
 def test_a_simulation_that_diverges_counts_as_a_fall_with_finite_numbers(simulated):

@@ -16,7 +16,6 @@ from compare.analysis.record_statistics import (
     TARGETS,
     Curve,
     approximate_rank_sum,
-    bootstrap_interval,
     compute_a12,
     compute_band,
     compute_ecdf,
@@ -186,22 +185,6 @@ def test_best_known_is_the_best_that_the_judge_accepts() -> None:
     assert find_best_known(records, POWER) == 11.0
     assert find_best_known(records, Objective(name="margin", unit="m", sense="maximise")) == 13.0
     assert math.isnan(find_best_known(records[2:3], POWER)) and math.isnan(find_best_known([], POWER))
-
-
-def test_bootstrap_interval_is_a_quantile_of_the_resamples() -> None:
-    seen: list[float] = []
-
-    def count(x: np.ndarray) -> float:
-        assert x.dtype == float and len(x) == 3
-        seen.append(float(len(seen)))
-        return seen[-1]
-
-    assert bootstrap_interval([[1, 2, 3]], count) == (50.0, 1950.0)  # 2.5 % and 97.5 % of 2000
-    assert len(seen) == 2000
-    seen.clear()
-    assert bootstrap_interval([[1, 2, 3]], count, level=1.0) == (0.0, 1999.0)
-    sample = list(range(30))
-    assert bootstrap_interval([sample], np.mean) == bootstrap_interval([sample], np.mean)
 
 
 @given(costs, costs)

@@ -36,10 +36,6 @@ def load_small() -> GaitProblem:
     return load("nao-ssp", intervals=2)
 
 
-def list_sweep(**options: Any) -> Sweep:
-    return Sweep(problem=load("walk12"), starts=1, **options)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Case:
     """A small question, the command that asks it, and the name in its answer of the rows of its CSV file; both may be empty."""
@@ -51,14 +47,9 @@ class Case:
 
 CASES = {
     "sweep": Case(
-        make=lambda: list_sweep(axes=[parse_axis("step_length_m=0.08,0.1")]),
+        make=lambda: Sweep(problem=load("walk12"), starts=1, axes=[parse_axis("step_length_m=0.08,0.1")]),
         rows="points",
         line="sweep walk12 --over step_length_m=0.08,0.1 --starts 1",
-    ),
-    "search": Case(
-        make=lambda: list_sweep(axes=[parse_axis("foot_lift_m=0.01,0.03")], algorithm="random", evaluations=200),
-        rows="points",
-        line="sweep walk12 --over foot_lift_m=0.01,0.03 --starts 1 --algorithm random --evaluations 200",
     ),
     "variants": Case(
         make=lambda: Variants(
