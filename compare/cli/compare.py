@@ -18,7 +18,7 @@ from compare.analysis.tuning import tune_solvers
 from compare.analysis.units import with_unit
 from compare.cli import options
 from compare.cli.command import OUTPUT, SESSION, command, get_marks, report_interrupts
-from compare.cli.printing import Output, Rows, describe_command, say, say_error, show_progress
+from compare.cli.printing import Output, Rows, describe_command, say, say_error, show_progress, stderr
 from compare.report import write_report
 from compare.study.import_runs import read_imported_records
 from compare.study.record import RunRecord
@@ -138,6 +138,8 @@ def compare(
     else:
         specs = [changes.make_spec(name) for name in problems or DEFAULT_PROBLEMS]
         settings = searches.make_study(specs, algorithms, starts)
+    if stderr.is_terminal:
+        say(f"watch it: nlp-gait report {out} --watch")
     remedy = f"continue with `nlp-gait compare --resume --out {out}`"
     records = run_in_folder(settings, out, jobs, scheduler, tune, remedy)
     imported = read_imported_records(out, records)

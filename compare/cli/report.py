@@ -14,7 +14,7 @@ from compare.cli.printing import Output, describe_command, say, show_progress
 from compare.logs import write_ioh
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.papers.paper_runs import Runner
-from compare.report import FurtherFiles, write_report
+from compare.report import FurtherFiles, watch_report, write_report
 from compare.study.evidence import read_evidence
 from compare.study.settings import read_manifest
 from nlp_gait.decoding import read_dataclass
@@ -24,6 +24,7 @@ CSV = "Write all runs and all judged points as CSV files too."
 LATEX = "Also write tables for papers: of each problem, and of all problems and solvers (LaTeX, package booktabs)."
 DIGITS = "Decimals of objectives in these tables (default: as many as different medians need to differ)."
 FIGURES = "Also write all figures as PNG, and for papers as PDF, one column wide, with captions in LaTeX."
+WATCH = "Rewrite the report while the study runs; the open page reloads itself."
 LOGS = "Also write the runs as logs for iohinspector, into the folder logs."
 OUT = "Folder for the report, its tables and figures; results stored in it are used again."
 QUICK = "The least work that fills every table and figure, instead of the paper's."
@@ -40,6 +41,7 @@ def report(
     logs: Annotated[bool, Option("--logs", help=LOGS)] = False,
     code: Code = None,
     csv: Annotated[bool, Option("--csv", help=CSV)] = False,
+    watch: Annotated[bool, Option("--watch", help=WATCH)] = False,
 ) -> Output:
     """Rewrite a study's report from all records of its folder, without running a solver.
 
@@ -47,9 +49,14 @@ def report(
     evaluated again. Records whose numbers do not follow from it, or that contradict a proof, are excluded; then the exit status
     is 1.
 
+    With `--watch` the report follows a running study until Ctrl-C.
+
     Examples: `nlp-gait report results`, `nlp-gait report results --latex --figures`
     """
     name_all(code)
+    if watch:
+        say(f"open {folder / 'report.html'}; it follows the study in {folder} until Ctrl-C")
+        watch_report(folder, lambda: _rewrite(folder))
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = evidence.records
     further = FurtherFiles(csv=csv, latex=latex or digits is not None, decimals=digits, figures=figures)
@@ -61,6 +68,11 @@ def report(
         write_ioh(comparisons, folder / "logs")
         written.append(folder / "logs")
     return Output(data={"excluded": evidence.sentences}, written=written, failures=list_excluded(evidence.sentences))
+
+
+def _rewrite(folder: Path) -> None:
+    evidence = read_evidence(folder)
+    write_report(folder, evidence.records, read_manifest(folder), excluded=evidence.excluded)
 
 
 @command

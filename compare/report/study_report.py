@@ -1,6 +1,7 @@
 """Report of a study from its records, and the better points in it."""
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from compare.analysis.comparison import Comparison, compare_problems
@@ -25,11 +26,13 @@ from compare.report.study_sections import (
 from compare.report.writing import write_document
 from compare.study.evidence import Exclusion
 from compare.study.record import RunRecord, load_gait
-from compare.study.record_files import name_group
+from compare.study.record_files import RECORDS, name_group
 from compare.study.settings import Manifest
-from nlp_gait.files import make_file_name, replace_nan, write_json
+from nlp_gait.files import make_file_name, replace_nan, write_json, write_text
 
 REPORT_ALONE = FurtherFiles()
+RELOAD = '<head>\n<meta http-equiv="refresh" content="5">'  # seconds between reloads of the page
+POLL_S = 2.0
 
 
 def write_report(
@@ -46,6 +49,21 @@ def write_report(
         document = make_study_document(comparisons, manifest, excluded)
         written = write_document(folder, document)
         return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons, document)]
+
+
+def watch_report(folder: Path, rewrite: Callable[[], object], sleep: Callable[[float], None] = time.sleep) -> None:
+    """Rewrite the report of a folder after every change of its records until Ctrl-C; the open page reloads itself."""
+    page, shown = folder / "report.html", None
+    try:
+        while True:
+            records = {path: path.stat().st_mtime_ns for path in (folder / RECORDS).glob("*/*.json")}
+            if records and records != shown:
+                rewrite()
+                write_text(page, page.read_text(encoding="utf-8").replace("<head>", RELOAD, 1))
+                shown = records
+            sleep(POLL_S)
+    except KeyboardInterrupt:
+        return
 
 
 def make_study_document(
