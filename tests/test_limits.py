@@ -14,7 +14,7 @@ import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.errors import GaitError
-from nlp_gait.formulation import GaitProblem, Grid, Result
+from nlp_gait.formulation import GaitProblem, Grid
 from nlp_gait.limits import FootClearance, FrictionCone, Limit, Point, Samples
 from nlp_gait.proofs.guarantee import guarantee
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -134,36 +134,6 @@ def test_friction_and_height_are_those_of_mujoco() -> None:
     s = np.linspace(0.0, 1.0, 11)
     above = heights - 0.01 * 16 * s**2 * (1 - s) ** 2
     np.testing.assert_allclose([rows[f"foot_clearance[sole, {k}]"] for k in range(1, 10)], above[1:-1], atol=1e-9)
-
-
-@pytest.mark.slow
-def test_limits_are_kept_by_the_contacts_of_a_simulated_gait() -> None:
-    """Means over 40 ms: drives are compliant, and contacts in an engine are not rigid."""
-    mujoco = pytest.importorskip("mujoco", reason="needs the extra sim")
-    from nlp_gait.simulation.plan import make_plan
-    from nlp_gait.simulation.simulate import Run
-
-    problem = nlp_gait.load("nao-ssp", limits=",".join(LIMITS), intervals=40).with_values(friction_coefficient=0.3)
-    x = problem.check_x((*OPTIMUM[:-1], 1.0))  # fast, so that there is friction
-    model = build_exact_model(problem)
-    rows = dict(zip(model.row_names, model.at(x, problem.p).g, strict=True))
-    run, measured, wrench = Run(make_plan(Result(problem=problem, x=x))), [], np.zeros(6)
-    feet = [run.model.body(run.plan.robot.feet[side].link).id for side in ("left", "right")]
-    while run.time_s < run.plan.duration_s:
-        run.advance(run.time_s + 1e-9)
-        force = np.zeros(3)
-        for i, contact in enumerate(run.data.contact):
-            if run.model.geom_bodyid[contact.geom.max()] == feet[0]:
-                mujoco.mj_contactForce(run.model, run.data, i, wrench)
-                force += contact.frame.reshape(3, 3).T @ wrench[:3]
-        measured.append((run.time_s, 0.3 * force[2] - np.hypot(force[0], force[1]), run.data.xpos[feet[1], 2]))
-    times, slack, height = np.array(measured).T
-    for k in range(4, 37, 4):  # of 40 intervals in 1 s
-        around = np.abs(times - k / 40) < 0.02
-        assert slack[around].mean() == pytest.approx(rows[f"friction[left, {k}]"], abs=0.25)  # [N], of 14 to 15.5
-        needed = 0.01 * 16 * (k / 40 * (1 - k / 40)) ** 2
-        above = height[around].mean() - height[0] - needed
-        assert above == pytest.approx(rows[f"foot_clearance[sole, {k}]"], abs=0.002)  # [m]
 
 
 @pytest.mark.slow

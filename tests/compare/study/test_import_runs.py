@@ -9,16 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.analysis.columns import ALL, format_rows, summarise
+from compare.analysis.columns import ALL, format_rows
 from compare.analysis.comparison import compare_problems
 from compare.analysis.failures import describe_unknown
 from compare.judge import evaluate
-from compare.report import FurtherFiles, write_report
 from compare.study.import_runs import import_runs, read_imported_records, read_points
 from compare.study.record_files import read_records, write_records
-from compare.study.run_study import Study, run_study
-from compare.study.settings import SolverSpec, StudySettings, read_manifest
-from compare.study.task import ProblemSpec, Stop
+from compare.study.task import ProblemSpec
 from nlp_gait.errors import GaitError
 from tests.compare.cli.calls import nlp_gait
 
@@ -67,33 +64,6 @@ def test_histories_give_runs_their_course(tmp_path: Path) -> None:
     first, *_ = import_runs(WALK, finals(tmp_path), "ga", history)
     assert first.history.evaluations == (10, 50) and first.history.objective == (None, 0.3)
     assert first.time_s.history == (0.1, 0.5) and first.time_s.solve == 0.5
-
-
-@pytest.mark.slow
-def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
-    study = StudySettings(problems=(WALK,), solvers=(SolverSpec(name="pso"),), runs=2, stop=Stop(evaluations=200))
-    run_study(Study(tasks=study.tasks(), folder=tmp_path))
-    records = import_runs(WALK, finals(tmp_path), "GA (MATLAB)", evaluations=5000)
-    write_records(records, tmp_path)
-    again = read_records(tmp_path)
-    assert {record.solver for record in again} == {"pso", "GA (MATLAB)"}
-    (comparison,) = compare_problems(again)
-    (ga,) = [row for row in summarise(comparison) if row["solver"] == "GA (MATLAB)"]
-    header, rows = format_rows(comparison, ALL)
-    shown = dict(zip(header, next(row for row in rows if row[0] == "GA (MATLAB)"), strict=True))
-    assert shown["time [s]"] == shown["claimed"] == "-" and "nan" not in " ".join(shown.values())
-    assert math.isnan(ga["time_s"]) and math.isnan(ga["seconds_to_1"]) and ga["evaluations"] == 5000
-    files = write_report(tmp_path, again, read_manifest(tmp_path), further=FurtherFiles(csv=True))
-    page = (tmp_path / "report.md").read_text()
-    assert "GA (MATLAB)" in page and not re.search(r"\bnan\b", page.replace("nan,", ""), re.IGNORECASE)
-    with open(next(path for path in files if path.name == "runs.csv")) as file:
-        rows = list(csv.DictReader(file))
-    assert [r["time_s"] for r in rows if r["solver"] == "GA (MATLAB)"] == ["", "", ""] and len(rows) == 5
-    with open(next(path for path in files if path.name == "walk12-points.csv")) as file:
-        points = [
-            [float(r[name]) for name in PROBLEM.names] for r in csv.DictReader(file) if r["solver"].startswith("GA")
-        ]
-    np.testing.assert_array_equal(points, POINTS)
 
 
 @pytest.mark.parametrize(

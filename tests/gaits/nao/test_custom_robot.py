@@ -78,32 +78,6 @@ def test_what_depends_on_the_robot_follows_from_its_file(path: str) -> None:
     assert measure_leg(load_robot(path), "R") == LegGeometry((0.0, -HIP_OFFSET, -0.085), THIGH, TIBIA, 0.04519)
 
 
-@pytest.mark.parametrize(("name", "x_m", "y_m"), [("nao-ssp", 0.05, 0.02), ("nao-dsp", 0.08, 0.08)])
-@pytest.mark.parametrize("robot", ["nao-v4", "nao-v5", "nao-v6"])
-def test_for_nao_the_papers_numbers_come_out_to_the_last_digit(name: str, x_m: float, y_m: float, robot: str) -> None:
-    problem = load(name, robot=robot)
-    assert (problem.lower[0], problem.upper[0]) == (0.25, 0.31)
-    assert (problem.value("dbm_x_mean_limit_m"), problem.value("dbm_y_mean_limit_m")) == (x_m, y_m)
-    x = np.array([0.3, 0.0, 0.0, 0.01, 0.02, 0.02, -0.02, 0.02, 2.0])[: len(problem.names)]
-    arrays = problem.signals(x).arrays
-    ends = {key: [tuple(arrays[key][k, :2]) for k in (0, -1)] for key in ("hip", "left_foot", "right_foot")}
-    expected = {
-        "nao-ssp": {
-            "hip": [(0.03, 0.025), (0.09, 0.025)],
-            "left_foot": [(0.06, 0.05)] * 2,
-            "right_foot": [(0.0, -0.05), (0.12, -0.05)],
-        },
-        "nao-dsp": {
-            "hip": [(0.07, 0.025), (0.11, -0.025)],
-            "left_foot": [(0.06, 0.05)] * 2,
-            "right_foot": [(0.12, -0.05)] * 2,
-        },
-    }[name]
-    rounding = 1e-16  # of the cubic at its end
-    for key, points in expected.items():
-        np.testing.assert_allclose(ends[key], points, rtol=0, atol=rounding)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_steps_may_be_longer(name: str) -> None:
