@@ -19,12 +19,13 @@ from nlp_gait.providers import PROBLEMS
 from tests.evaluation import evaluated
 from tests.robots.crooked import crooked
 
-# Another value for each option that is no choice among some; a grid with free joints needs a sample in its middle.
+# Another value for each option that is no choice among some; a grid with free joints needs a sample in its middle, one of
+# stairs by Simpson's rule an even number of parts in each phase.
 OTHER: dict[str, Any] = {
     "robot": "nao-v6",
     "steps": 4,
     "slope_deg": 3.0,
-    "intervals": 12,
+    "intervals": 16,
     "rotational_inertia": False,
     "step_length_m": 0.07,
     "samples_per_interval": 2,
