@@ -16,9 +16,9 @@ from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
 
-# Gupta, Pratihar, Deb (2023), Tables 6 and 8.
 # Forward and to the left.
 DIRECTIONS = {"forward": (1, 0), "backward": (-1, 0), "left": (0, 1), "right": (0, -1)}
+# Gupta, Pratihar, Deb (2023), Tables 6 and 8.
 PAPER = {
     "nao-ssp": {
         "paper's PSO": (0.31, -0.002, 0.0034, 0.008, 0.0025, 0.0243, -0.0256, 0.015, 4),

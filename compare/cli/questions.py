@@ -251,8 +251,6 @@ def run_question(question: Question[Any], out: Path) -> Output:
             stopped = str(interrupt) or f"interrupted{done}"
     if findings is None:
         return Output(data={}, interrupted=f"{stopped}; {describe_stored(out)}")
-    if store.summary:
-        say(store.summary)
     answer, failures = question.add_best_known(findings), question.failures(findings)
     output = write_answer(answer, out, stopped, [identify_problem(question.problem)])
     return replace(output, failures=[*output.failures, *(["; ".join(failures)] if failures else [])])
@@ -276,9 +274,7 @@ def write_answer(answer: Answer, out: Path, stopped: str = "", problems: Sequenc
         if isinstance(block, str):
             parts.append(block)
         elif isinstance(block, Table) and not block.name:
-            parts.append(
-                Rows(block.caption, tuple(block.columns), [[cell.text for cell in row] for row in block.cells])
-            )
+            parts.append(Rows(block.caption, tuple(block.columns), block.cells))
     return Output(
         data=answer.data,
         parts=parts,

@@ -6,12 +6,12 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from compare.drawing import STYLE
 from nlp_gait.files import replace_file, write_text
@@ -170,17 +170,3 @@ def mark_values(
     if values:
         transform = axes.get_xaxis_transform()
         axes.plot(values, [height] * len(values), marker, color=colour, label=label, transform=transform)
-
-
-def plot_bars(axes: Axes, names: Sequence[str], groups: Mapping[str, Sequence[float]], colours: Sequence[Any]) -> None:
-    """Plot horizontal bars, a row for each name from above, with a bar of a labelled group next to that of another.
-
-    The colour of a group may be a sequence, one for each bar.
-    """
-    height = 0.72 / len(groups)
-    for k, ((label, values), colour) in enumerate(zip(groups.items(), colours, strict=True)):
-        places = [i + (k - (len(groups) - 1) / 2) * height for i in range(len(names))]
-        axes.barh(places, values, height, color=colour, label=label)
-    axes.set_yticks(range(len(names)), names)
-    axes.invert_yaxis()
-    axes.grid(visible=False, axis="y")

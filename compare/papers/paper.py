@@ -293,8 +293,7 @@ def encode_part(part: Part) -> dict[str, Any]:
     if isinstance(part, Section):
         return {"title": part.title, "parts": [encode_part(child) for child in part.parts]}
     if isinstance(part, Table):
-        rows = [[cell.text for cell in row] for row in part.cells]
-        return {"caption": part.caption, "columns": [*part.columns], "rows": rows}
+        return {"caption": part.caption, "columns": [*part.columns], "rows": part.cells}
     if isinstance(part, Figure):
         return {"figure": part.name, "caption": part.caption}
     return {"text": part.markdown if isinstance(part, Prose) else str(part)}

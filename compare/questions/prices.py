@@ -18,7 +18,7 @@ from compare.analysis.units import (
     name_in_words,
     with_unit,
 )
-from compare.drawing.figures import make_figure, plot_bars, use_style
+from compare.drawing.figures import make_figure, use_style
 from compare.questions.perturbed_problem import get_quantity, is_mass, perturb_robot
 from compare.questions.question import Answer, Question, Work, make_record_table
 from compare.report.document import Figure, Part, make_text_table
@@ -338,7 +338,9 @@ def plot_prices(findings: FoundPrices, problem: GaitProblem) -> Drawing:
         for axes, (title, prices) in zip(all_axes, groups.items(), strict=True):
             names = [f"{name_in_words(price.name, price.unit)}, {price.words}" for price in prices]
             values = [scale * price.per_step for price in prices]
-            plot_bars(axes, names, {title: values}, [[UP if value > 0.0 else DOWN for value in values]])
+            axes.barh(names, values, 0.72, color=[UP if value > 0.0 else DOWN for value in values])
+            axes.invert_yaxis()
+            axes.grid(visible=False, axis="y")
             axes.axvline(0.0, color="0.3", linewidth=0.6)
             axes.set(title=title, xlabel=make_heading(f"change of {problem.objective.name}", unit))
     return figure

@@ -1,17 +1,13 @@
 """The price of robustness: least power of a gait that keeps its limits for all masses and soles within their tolerances."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any, ClassVar
 
-from matplotlib.figure import Figure as Drawing
-
-from compare.drawing.figures import add_legend_below, make_axes, plot_bars, use_style
 from compare.questions.perturbed_problem import is_mass
 from compare.questions.question import Answer, Question, Work, make_optima_table, make_record_table, make_table
 from compare.questions.robust_gait import Box, RobustGait, Worst, make_boxes, solve_robust
-from compare.report.document import Figure
 from compare.study.task import describe_problem
 from nlp_gait.backends.identity import fingerprint
 
@@ -51,7 +47,6 @@ class Robust(Question[tuple[RobustGait, ...]]):
 
     def report(self, findings: tuple[RobustGait, ...]) -> Answer:
         name, stem, nominal, widest = self.problem.name, f"{self.problem.name}-robust", findings[0], findings[-1]
-        shown = "Power with the nominal robot and in the worst corner."
         return Answer(
             stem=stem,
             title=f"{name}: price of robustness",
@@ -64,7 +59,6 @@ class Robust(Question[tuple[RobustGait, ...]]):
                     if gait.nominal_worst.violation > 0.0
                 ),
                 make_optima_table({"nominal": nominal.nominal_x, **{gait.name: gait.x for gait in findings}}),
-                Figure(name=stem, caption=shown, drawing=plot_robust(findings)),
                 make_record_table(stem, findings, leave_out=("corners", "robots")),
             ),
             data={"problem": name, "boxes": [asdict(gait) for gait in findings]},
@@ -99,20 +93,6 @@ PRICES = {
     "random corners": lambda g: _describe_violation(g.random_worst),
     "scenarios": lambda g: f"{len(g.corners)}" + ("" if g.settled else ", not settled"),
 }
-
-
-def plot_robust(gaits: Sequence[RobustGait]) -> Drawing:
-    """Plot the power with the nominal robot and in the worst corner."""
-    nominal = gaits[0].nominal_W
-    with use_style():
-        figure, axes = make_axes(4.2, 2.7)
-        powers, worst = [nominal, *(g.power_W for g in gaits)], [nominal, *(g.worst_W for g in gaits)]
-        names = ["none", *(gait.name for gait in gaits)]
-        plot_bars(axes, names, {"nominal robot": powers, "worst corner": worst}, ("#0072B2", "#D55E00"))
-        axes.set(title="uncertain", xlabel="power [W], axis cut off")
-        axes.set_xlim(left=0.8 * nominal)
-        add_legend_below(figure)
-    return figure
 
 
 def _describe_box(box: Mapping[str, float]) -> str:

@@ -6,13 +6,10 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import make_axis_label, with_unit
-from compare.drawing.figures import add_legend_below, make_axes, plot_bars, use_style
+from compare.analysis.units import with_unit
 from compare.judge import evaluate
 from compare.questions.question import Answer, Question, Work, make_optima_table, make_record_table, make_table
-from compare.report.document import Figure
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
@@ -233,14 +230,12 @@ class Variants(Question[tuple[SolvedVariant, ...]]):
         }
         same = [v for v in findings if v.moved is not None]
         optima = (make_optima_table({v.name: v.x for v in same}),) if len(same) > 1 else ()
-        shown = "Objective at the optimum and at the first optimum."
         return Answer(
             stem=stem,
             title=f"{name}: variants",
             parts=(
                 make_table("What each variant changes; how each was solved is in the CSV file", findings, changes),
                 *optima,
-                Figure(name=stem, caption=shown, drawing=plot_variants(findings, self.problem)),
                 make_record_table(stem, findings),
             ),
             data={"problem": name, "variants": [asdict(variant) for variant in findings]},
@@ -285,18 +280,3 @@ def _group(names: Iterator[str] | Sequence[str] | Mapping[str, float]) -> dict[s
     for name in names:
         groups.setdefault(name.partition("[")[0], []).append(name)
     return groups
-
-
-def plot_variants(variants: Sequence[SolvedVariant], problem: GaitProblem) -> Drawing:
-    """Plot the objectives in the first one's unit, next to those at the first optimum where all have its variables."""
-    shown = [variant for variant in variants if variant.unit == variants[0].unit]
-    groups, colours = {"at the optimum": [variant.objective for variant in shown]}, ["#0072B2"]
-    unchanged = [variant.unchanged for variant in shown if variant.unchanged is not None]
-    if len(unchanged) == len(shown):
-        groups, colours = {"at the first optimum": unchanged, **groups}, ["0.75", *colours]
-    with use_style():
-        figure, axes = make_axes(4.6, 0.9 + 0.34 * len(shown))
-        plot_bars(axes, [variant.name for variant in shown], groups, colours)
-        axes.set_xlabel(make_axis_label(problem.objective.name, shown[0].unit))
-        add_legend_below(figure)
-    return figure

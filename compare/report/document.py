@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -22,14 +21,6 @@ Rows = Sequence[Sequence[Value]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cell:
-    """Text of a cell, and the number by which its column is sorted; None sorts by the text."""
-
-    text: str
-    key: float | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
 class Table:
     """Table of values with all digits, and their format on a page."""
 
@@ -41,12 +32,10 @@ class Table:
     prose: bool = False  #: the cells are sentences: all columns are left-aligned
 
     @property
-    def cells(self) -> tuple[tuple[Cell, ...], ...]:
+    def cells(self) -> list[list[str]]:
         """Rows as shown on a page."""
-        return tuple(
-            tuple(_make_cell(value, form) for value, form in zip(row, self.columns.values(), strict=True))
-            for row in self.rows
-        )
+        forms = self.columns.values()
+        return [[_format_cell(value, form) for value, form in zip(row, forms, strict=True)] for row in self.rows]
 
     @property
     def csv_rows(self) -> list[list[object]]:
@@ -126,23 +115,11 @@ def iterate_leaves(parts: Sequence[Part]) -> Iterator[str | Prose | Table | Figu
             yield part
 
 
-def _make_cell(value: Value, form: str) -> Cell:
+def _format_cell(value: Value, form: str) -> str:
     if value is None:
-        return Cell(text="-", key=math.inf)
+        return "-"
     if isinstance(value, str):
-        return Cell(text=value, key=_read_leading_number(value))
+        return value
     if isinstance(value, bool):
-        return Cell(text="yes" if value else "no")
-    return Cell(text=format_number(value, form), key=value if math.isfinite(value) else math.inf)
-
-
-def _read_leading_number(text: str) -> float | None:
-    """Return for example 10000 for "10 000 calls", with a thin space; infinity for a dash, so that missing values come last."""
-    if text == "-":
-        return math.inf
-    first = text.replace("\u202f", "").split(" ")[0].split("/")[0]
-    try:
-        number = float(first.removeprefix("<"))
-    except ValueError:
-        return None
-    return number if math.isfinite(number) else None
+        return "yes" if value else "no"
+    return format_number(value, form)

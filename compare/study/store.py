@@ -2,11 +2,7 @@
 
 import json
 import math
-import tempfile
-import weakref
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from types import ModuleType
@@ -31,7 +27,6 @@ from nlp_gait.user_code import remove_comments
 FOLDER = "store"  # in the folder of the work
 KEY_DIGITS = 20
 CODE = "code_sha256"  # input: hash of the modules that compute a result
-STORED, COMPUTED = b"s", b"c"
 MISSING: Any = object()  # a result may be None
 
 
@@ -61,9 +56,6 @@ class Store:
     def __init__(self, out: Path | None = None, report: Progress | None = None) -> None:
         self.folder = None if out is None else make_writable_folder(out / FOLDER)
         self._report = report
-        self._counted: set[Path] = set()  # one run may need a result several times
-        self._counts = tempfile.TemporaryFile("w+b", buffering=0)  # noqa: SIM115  one byte for each result, shared with forks
-        weakref.finalize(self, self._counts.close)
         if self.folder is not None:
             for folder in (self.folder, *(path for path in self.folder.rglob("*") if path.is_dir())):
                 remove_leftovers(folder)
@@ -132,14 +124,12 @@ class Store:
         is_intact = content["sha256"] == hash_json([content["result"], content["inputs"]])
         if not is_intact or not _have_same_probes(content["inputs"], inputs):
             return MISSING
-        self._count(STORED, path)
         return content["result"]
 
     def save(self, name: str, inputs: Mapping[str, Any], value: Any) -> Any:
         """Store a result, and return it as ``load`` does; raises as ``compute_all``."""
         value, inputs = pass_through_json(value), pass_through_json(inputs)
         path = self._locate(name, inputs)
-        self._count(COMPUTED, path)
         if path is not None:
             try:
                 make_writable_folder(path.parent)
@@ -151,23 +141,9 @@ class Store:
                 self._report(f"{error}; continuing without storing results")
         return value
 
-    @property
-    def summary(self) -> str:
-        """How many results were stored by an earlier run, as a sentence; empty if none."""
-        self._counts.seek(0)
-        counts = Counter(self._counts.read())
-        stored = counts[STORED[0]]
-        return f"{stored} of {counts.total()} results were stored by an earlier run" if stored else ""
-
     def _locate(self, name: str, inputs: Mapping[str, Any]) -> Path | None:
         key = hash_json(split_probes(inputs)[0])[:KEY_DIGITS]
         return None if self.folder is None else self.folder / f"{name}-{key}.json"
-
-    def _count(self, kind: bytes, path: Path | None) -> None:
-        if path is None or path not in self._counted:
-            self._counted.update(() if path is None else (path,))
-            with suppress(OSError):
-                self._counts.write(kind)
 
 
 def _have_same_probes(stored: Any, inputs: Any) -> bool:

@@ -47,7 +47,7 @@ DOORS = {
     ),
     "compare.papers.rules": ("Found",),
     "compare.report": (),
-    "compare.report.document": ("Cell", "Document", "Figure", "Prose", "Section", "Table", "make_text_table"),
+    "compare.report.document": ("Document", "Figure", "Prose", "Section", "Table", "make_text_table"),
     "compare.report.writing": ("render_markdown", "write_document"),
     "compare.archive": (),
     "compare.logs": (),

@@ -4,8 +4,10 @@ for (const table of document.querySelectorAll("table")) {
   const heads = [...table.tHead.rows[0].cells];
   const body = table.tBodies[0];
   const key = (row, column) => {
-    const cell = row.cells[column];
-    return cell.dataset.key === undefined ? cell.textContent : Number(cell.dataset.key.replace("inf", "Infinity"));
+    const text = row.cells[column].textContent;
+    if (text === "-") return Infinity; // missing values come last
+    const number = Number(text.replace(/[\u202f<]/g, "").split(/[ /]/)[0] || NaN); // 10000 for "10 000 calls", with a thin space
+    return Number.isNaN(number) ? text : number;
   };
   const compare = (a, b) => {
     if (typeof a === "number" && typeof b === "number") return a === b ? 0 : a < b ? -1 : 1;

@@ -87,17 +87,6 @@ def test_what_json_cannot_represent_is_not_stored(number: float, tmp_path: Path)
         pass_through_json([number])
 
 
-def test_only_results_of_earlier_runs_are_counted_each_once(tmp_path: Path) -> None:
-    store = Store(tmp_path)
-    for _ in range(3):
-        store.compute("one", {}, lambda: 1)
-    assert store.summary == ""
-    later = Store(tmp_path)
-    for name in ("one", "two", "one", "two"):
-        later.compute(name, {}, lambda: 1)
-    assert later.summary == "1 of 2 results were stored by an earlier run"
-
-
 def test_a_folder_that_cannot_be_written_is_reported_once(tmp_path: Path) -> None:
     messages: list[str] = []
     for folder, report in ((tmp_path / "a", None), (tmp_path / "b", messages.append)):
