@@ -13,6 +13,7 @@ from compare.analysis.columns import PRINTED, format_rows, summarise
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.failures import describe_failures, describe_unknown
 from compare.analysis.headline import write_headlines
+from compare.analysis.live_gaps import LiveGaps
 from compare.analysis.tuning import tune_solvers
 from compare.analysis.units import with_unit
 from compare.cli import options
@@ -174,11 +175,12 @@ def run_in_folder(
             settings = tune_solvers(study, settings, tune, say)
         study = replace(study, tasks=settings.tasks())
     write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
+    gaps = LiveGaps()
     with show_progress("runs", len(study.tasks)) as advance:
         try:
             return run_study(
                 study,
-                progress=lambda _, record: advance(f"{record.solver} on {record.problem}: {record.objective_text}"),
+                progress=lambda _, record: advance(gaps.add(record)),
                 on_stored=lambda count: advance("stored", count),
                 on_outdated=say,
             )
