@@ -186,15 +186,6 @@ def test_tables_sort(browser: Any, report: Path, screen: str) -> None:
         assert opened.page.locator("section:has(#figure-walk-final) table").first.locator("[aria-sort]").count() == 1
 
 
-def test_what_a_page_loads_is_noticed(browser: Any, report: Path, tmp_path: Path) -> None:
-    """The page's own policy blocks it, with a message on the console: what the first test would see."""
-    probed = tmp_path / "probed.html"
-    image = '<img src="http://127.0.0.1:9/x.png">'
-    probed.write_text(report.read_text(encoding="utf-8").replace("</main>", image + "</main>"), encoding="utf-8")
-    with visit(browser, probed) as opened:
-        assert any("127.0.0.1:9" in message for message in opened.messages)
-
-
 def test_a_solution_is_a_page_of_its_own_and_a_frame_in_notebooks(browser: Any, tmp_path: Path) -> None:
     shown = animate_gait(nlp_gait.load("nao-dsp"), DSP_X, "paper")
     (tmp_path / "notebook.html").write_text(f"<!DOCTYPE html><main>{shown._repr_html_()}</main>", encoding="utf-8")

@@ -80,18 +80,6 @@ def test_an_impossible_stair_names_what_forbids_it(problem: GaitProblem) -> None
     assert refused.worst_violations[0].name.startswith(("reach", "link_", "knee_angle"))
 
 
-def test_signals_have_one_row_for_each_sample(problem: GaitProblem) -> None:
-    arrays = problem.signals(np.array(NEAR_BEST)).arrays
-    assert {len(array) for array in arrays.values()} == {44}
-    assert arrays["t"][0] == 0.0
-    assert arrays["t"][-1] == pytest.approx(3.5)
-    assert arrays["q"].shape == arrays["tau"].shape == (44, 7)
-    jumps = np.flatnonzero(np.diff(arrays["t"]) == 0.0)
-    assert len(jumps) == 3  # both sides of each knot
-    assert np.abs(arrays["q"][jumps] - arrays["q"][jumps + 1]).max() < 1e-9
-    assert np.abs(arrays["qd"][jumps] - arrays["qd"][jumps + 1]).max() < 1e-9
-
-
 @pytest.mark.parametrize("rule", ["trapezoid", "simpson"])
 def test_energy_is_the_integral_of_power_by_the_rule(rule: str) -> None:
     """Against SciPy, phase by phase; both ends of a phase are samples."""
