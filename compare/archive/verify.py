@@ -15,7 +15,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
-from compare.archive.unpack import MANIFEST, unpack_archive
+from compare.archive.unpack import unpack_archive
 from compare.report import FurtherFiles, write_report
 from compare.study.evidence import CheckedRecords, compute_in_forks, name_record, read_evidence
 from compare.study.origin import hash_installed_code
@@ -41,7 +41,6 @@ NOT_REPEATED = ("problem", "solver", "run", "inputs", "time_s", "origin")
 FURTHER_S = 2.0
 MOST_CERTIFICATES = 20  # whose proofs are followed in one call
 PAGES = ("report.html", "report.md")
-OF_ARCHIVES = (MANIFEST, FILE, "README.md", "requirements.txt")
 MOST_NAMED = 5  # runs or files in a sentence
 
 

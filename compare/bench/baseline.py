@@ -8,7 +8,6 @@ import lzma
 import math
 import re
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -21,7 +20,7 @@ from compare.study.task import GRADIENT_SOLVERS, Handling, Inputs, ProblemSpec, 
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError
 from nlp_gait.gaitbench.facts import Subset
-from nlp_gait.gaitbench.generated import is_generated, list_test_seeds, make_id
+from nlp_gait.gaitbench.generated import is_generated, make_id
 
 # Rules: the same runs, budget and seeds for all solvers.
 RUNS = 15
@@ -52,17 +51,13 @@ def choose_instances(
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
-    """Return the seeds of ``0:15`` (15 is not among them), ``3,5,8`` or ``test:5``, today's; raises InputError."""
-    if text.startswith("test:") and text.removeprefix("test:").isdecimal():
-        return list_test_seeds(datetime.now(UTC).date(), int(text.removeprefix("test:")))
+    """Return the seeds of ``0:15`` (15 is not among them) or ``3,5,8``; raises InputError."""
     match = SEEDS.fullmatch(text)
     seeds = tuple(range(int(match[1]), int(match[2]))) if match else ()
     if not match and all(word.strip().isdecimal() for word in text.split(",")):
         seeds = tuple(int(word) for word in text.split(","))
     if not 0 < len(seeds) <= MOST_SEEDS:
-        raise InputError(
-            f"--seeds takes FIRST:END, test:COUNT or numbers with commas, at most {MOST_SEEDS}, got {text!r}"
-        )
+        raise InputError(f"--seeds takes FIRST:END or numbers with commas, at most {MOST_SEEDS}, got {text!r}")
     return seeds
 
 

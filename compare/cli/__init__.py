@@ -51,6 +51,7 @@ REPLACEMENTS = {
         "bench --verify, bench --rerun, bench --code": "verify FILE.zip checks an archive, with --rerun and --code",
         "bench --objectives": "pareto PROBLEM --search NSGA2=10000 compares searches with the true front",
         "capabilities, sweep --capabilities": "sweep --over speed_m_s=LOW:HIGH:COUNT names what stops the robot",
+        "certainty --evaluations": "compare PROBLEM --algorithms cma --starts 0 --runs 1 --evaluations N runs a long search",
         "cite": "list --cite [NAME] prints BibTeX",
         "export-objective, export-solver, export --format": "export --to KIND names the kind of the file",
         "list --algorithms": "list algorithms shows the settings of all",

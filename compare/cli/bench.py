@@ -23,7 +23,7 @@ from nlp_gait.files import make_writable_folder
 
 SUITE = "small (ten instances, minutes), full, or drawn: instances of families that the baseline has, too."
 FAMILIES = "Only instances that these families draw, separated by commas: ssp, dsp, humanoid-ssp, ..."
-SEEDS = "Of the drawn instances: FIRST:END without END, numbers separated by commas, or test:COUNT for those of today."
+SEEDS = "Of the drawn instances: FIRST:END without END, or numbers separated by commas."
 ALGORITHM = "Your algorithm as my.py:MyAlgo or module:name, or a name; without it, only the baseline is shown."
 AGAINST = "Solvers that run beside yours where no baseline is shipped, separated by commas."
 AUDIT = "Examine --algorithm for biases instead: does it gain where the optimum is in the middle, or clip to bounds?"

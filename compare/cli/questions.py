@@ -30,7 +30,6 @@ from nlp_gait.proofs.certificate import check_certificate, load_certified_proble
 
 FRONT_SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
 CYCLES = ("nao-cycle", "humanoid-cycle")  # whose speed is a parameter if the objective is the power
-LONG_SEARCH = "Budget of one long CMA-ES with restarts; 0 for none."
 PROOF = "Of the proof [s], for at most four variables and NAO's phases; 0 for none."
 CHECK = "Certificate to check instead: look for a better point, then repeat paths of its proof."
 COMPLETE = "With --check: also repeat the whole proof; rerun to continue."
@@ -44,7 +43,6 @@ ENGINE = "Simulate steps of each walking cycle in MuJoCo (extra sim)."
 def certainty(
     *,
     starts: Annotated[int, Option(min=1, max=1000000, help="Random starts of IPOPT.")] = 10_000,
-    evaluations: Annotated[int, Option(min=0, max=1000000000000, help=LONG_SEARCH)] = 1_000_000,
     time_limit: Annotated[float, Option(min=0.0, max=1e9, help=PROOF)] = 1800.0,
     seed: options.Seed = 0,
     problem: options.AnyProblem,
@@ -53,9 +51,9 @@ def certainty(
     code: options.Code = None,
     out: options.OutFolder = Path("certainty"),
 ) -> Output:
-    """Gather evidence that the best optimum is the global one: many starts, a long search, and a proof for few variables.
+    """Gather evidence that the best optimum is the global one: many starts, and a proof for few variables.
 
-    Examples: `nlp-gait certainty walk12 --set lambda=1`, `nlp-gait certainty nao-ssp --starts 1000 --evaluations 0`,
+    Examples: `nlp-gait certainty walk12 --set lambda=1`, `nlp-gait certainty nao-ssp --starts 1000`,
     `nlp-gait certainty --check certainty/walk12-certificate.json`
     """
     if check is not None:
@@ -65,9 +63,7 @@ def certainty(
         return _check(check, seed, out if complete else None)
     if complete:
         raise InputError("--complete repeats the proof of a certificate; name its file by --check FILE")
-    question = Certainty(
-        problem=problem.spec().load(), starts=starts, evaluations=evaluations, time_limit_s=time_limit, seed=seed
-    )
+    question = Certainty(problem=problem.spec().load(), starts=starts, time_limit_s=time_limit, seed=seed)
     return run_question(question, out)
 
 

@@ -1,17 +1,16 @@
 """Evidence that the best known optimum is the global one: what is proven, and what is only supported."""
 
 import math
+import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
-from compare.analysis.best_known import compute_gap
 from compare.analysis.units import with_unit
-from compare.questions.local_optima import LocalOptimum, bound_missed, cluster_ends, run_stored_starts
 from compare.questions.question import Answer, Question, Work
 from compare.report.document import make_text_table
 from compare.study.references import find_reference
@@ -20,10 +19,11 @@ from metaheuristics.minimize import minimize
 from metaheuristics.registry import make_algorithm
 from nlp_gait.backends.identity import fingerprint, hash_json, identify_problem, make_key
 from nlp_gait.backends.kernel.compiled import compile_objective
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.files import replace_nan
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaitbench.facts import SIX_DIGITS
 from nlp_gait.proofs.bounds import has_power_form
 from nlp_gait.proofs.branch_and_bound import TOLERANCE, Certificate, certify
@@ -33,16 +33,33 @@ from nlp_gait.proofs.checkpoint import PROVER
 # Branch and bound is for this many variables, because its work grows exponentially with them; a least-power form allows nine.
 MOST_VARIABLES = 4
 LISTED = 10  # best distinct optima
+BATCH = 250  # starts that are stored together
+# Ends are one optimum if their objectives differ by no more than this, relative, and no variable by more than this share of its
+# range.
+SAME_OBJECTIVE = 1e-5
+SAME_X = 0.01
+CONFIDENCE = 0.95
 CHECK_EVALUATIONS = 20_000  # of a search that a certificate is compared with
 
 
 @dataclass(frozen=True, kw_only=True)
-class LongSearch:
-    """One long run of CMA-ES with restarts, which shares only the exact functions with IPOPT."""
+class StartEnd:
+    """End of a start."""
 
-    objective: float | None  #: best feasible one, in the problem's sense; None if there was none
-    evaluations: int  #: used
-    gap: float | None  #: relative distance to the best known value; negative if it is better
+    x: tuple[float, ...]  #: (n,)
+    objective: float  #: exact value, in the problem's sense
+    feasible: bool  #: converged, and feasible for the exact functions
+    status: str  #: in words
+
+
+@dataclass(frozen=True, kw_only=True)
+class LocalOptimum:
+    """Distinct local optimum."""
+
+    objective: float  #: of its best end, in the problem's sense
+    count: int  #: number of starts that reached it
+    share: float  #: of the starts that converged
+    x: tuple[float, ...]  #: of its best end
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,7 +71,6 @@ class FoundCertainty:
     statuses: dict[str, int]  #: number of starts by their status
     optima: tuple[LocalOptimum, ...]  #: distinct local optima, best first
     largest_missed: float  #: share of starts that one unseen optimum attracts, at most, with 95 % confidence
-    search: LongSearch | None  #: None if it was not requested
     certificate: Certificate | None  #: None if it was not requested, or branch and bound is not possible
 
     @property
@@ -79,14 +95,11 @@ class FoundCertainty:
     def supported(self) -> str:
         """What is only supported, in one sentence."""
         best = self.optima[0]
-        text = (
+        return (
             f"{best.count} of {sum(o.count for o in self.optima)} converged starts reach the best of {len(self.optima)} "
             f"distinct optima; with 95 % confidence no unseen one attracts more than "
             f"{100 * self.largest_missed:.2g} % of starts"
         )
-        if self.search is not None and self.search.gap is not None:
-            text += f"; after {self.search.evaluations:,} evaluations CMA-ES is {100 * self.search.gap:+.2g} % off the best known"
-        return text
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data, without the ends of the starts."""
@@ -98,37 +111,33 @@ class FoundCertainty:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Certainty(Question[FoundCertainty]):
-    """How certain is it that the best known optimum is the global one: many starts, a long search and, if possible, a proof."""
+    """How certain is it that the best known optimum is the global one: many starts and, if possible, a proof."""
 
     name: ClassVar[str] = "certainty"
 
     starts: int  #: of IPOPT
-    evaluations: int  #: of CMA-ES; 0 for none
     tolerance: float = TOLERANCE  #: of the proof, relative
     time_limit_s: float = 1800.0  #: of the proof [s]; 0 for none
-    seed: int = 0  #: of starts and search
+    seed: int = 0  #: of the starts
 
     def __post_init__(self) -> None:
         """Validate the limits of the proof.
 
         Raises:
             InputError: tolerance or time limit are not allowed.
-            SearchError: CMA-ES is requested and not installed.
         """
         if not (0.0 < self.tolerance < 1.0 and 0.0 <= self.time_limit_s < math.inf):
             raise InputError(
                 "the tolerance must be between 0 and 1, the time limit finite and >= 0 s; "
                 f"got {self.tolerance}, {self.time_limit_s} s"
             )
-        if self.evaluations:
-            make_algorithm("cma")
 
     def find(self, work: Work) -> Iterator[FoundCertainty]:
         """Yield the evidence.
 
         Raises:
             InputError: no start converged.
-            CompilerError: a search or a proof is requested and there is no compiler.
+            CompilerError: a proof is requested and there is no compiler.
         """
         problem, store = self.problem, work.store
         ends = run_stored_starts(problem, work, starts=self.starts, seed=self.seed)
@@ -140,7 +149,7 @@ class Certainty(Question[FoundCertainty]):
         best, x = optima[0].objective, optima[0].x
         known = find_reference(identify_problem(problem))
         if known.objective is not None and problem.objective.sign * (best - known.objective) > 0.0:
-            best, x = known.objective, known.x
+            x = known.x
         identity = {**fingerprint(problem), "best": list(x)}
         limits = {"tolerance": self.tolerance, "time_limit_s": self.time_limit_s}
 
@@ -149,12 +158,7 @@ class Certainty(Question[FoundCertainty]):
             checkpoint = None if store.folder is None else store.folder / name
             return certify(problem, np.array(x), **limits, progress=work.progress, checkpoint=checkpoint)
 
-        search = certificate = None
-        if self.evaluations:
-            inputs = {**identity, "evaluations": self.evaluations, "seed": self.seed}
-            function = partial(_search, problem, best, self.evaluations, self.seed)
-            search = work.compute(LongSearch, "cma", inputs, function)
-            work.progress("long search")
+        certificate = None
         if self.time_limit_s and (len(problem.names) <= MOST_VARIABLES or has_power_form(problem)):
             inputs = {**identity, **limits, "prover": PROVER}
             certificate = work.compute(Certificate, "certificate", inputs, prove)
@@ -164,7 +168,6 @@ class Certainty(Question[FoundCertainty]):
             statuses=dict(Counter(end.status for end in ends)),
             optima=tuple(optima),
             largest_missed=bound_missed(sum(optimum.count for optimum in optima)),
-            search=search,
             certificate=certificate,
         )
 
@@ -202,9 +205,59 @@ def search_point(problem: GaitProblem, seed: int = 0) -> Array:
     return np.array(search.x)
 
 
-def _search(problem: GaitProblem, best: float, evaluations: int, seed: int) -> LongSearch:
-    result = minimize(compile_objective(problem), make_algorithm("cma"), evaluations=evaluations, seed=seed)
-    if result.violation > FEASIBILITY_TOLERANCE:
-        return LongSearch(objective=None, evaluations=result.evaluations, gap=None)
-    value = problem.objective.sign * result.objective
-    return LongSearch(objective=value, evaluations=result.evaluations, gap=compute_gap(value, best, problem.objective))
+def run_stored_starts(
+    problem: GaitProblem, work: Work, *, starts: int, seed: int = 0, solver: Solver | None = None
+) -> list[StartEnd]:
+    """Run a solver (by default IPOPT) from random starts, in stored batches, with a note about each batch.
+
+    The start points of batch k depend on the seed and k only.
+
+    Raises:
+        InputError: fewer than one start.
+        OutputError: a batch cannot be stored.
+    """
+    if starts < 1:
+        raise InputError(f"starts must be at least 1, got {starts}")
+    solver = solver or IpoptSettings()
+    ready = solver.prepare(problem, starts)
+    identity = {**fingerprint(problem), "seed": seed, "settings": repr(solver)}
+    ends: list[StartEnd] = []
+    for k, first in enumerate(range(0, starts, BATCH)):
+        count = min(BATCH, starts - first)
+        inputs = {**identity, "batch": k, "count": count}
+        batch = partial(_run_batch, problem, ready, seed, k, count)
+        ends += work.compute(tuple[StartEnd, ...], f"starts-{first}", inputs, batch, code=[sys.modules[__name__]])
+        work.progress(f"{len(ends)} starts")
+    return ends
+
+
+def _run_batch(problem: GaitProblem, solver: Solver, seed: int, batch: int, count: int) -> tuple[StartEnd, ...]:
+    rng = np.random.default_rng([seed, batch])
+    outcomes = [solver.run(problem, problem.start_point(rng)) for _ in range(count)]
+    return tuple(
+        StartEnd(x=tuple(end.x.tolist()), objective=end.objective, feasible=bool(end.converged), status=end.status)
+        for end in outcomes
+    )
+
+
+def cluster_ends(problem: GaitProblem, ends: Sequence[StartEnd]) -> list[LocalOptimum]:
+    """Return the distinct optima among the feasible ends, best first."""
+    feasible = sorted((end for end in ends if end.feasible), key=lambda end: problem.objective.sign * end.objective)
+
+    def is_same(end: StartEnd, head: StartEnd) -> bool:
+        near = abs(end.objective - head.objective) <= SAME_OBJECTIVE * abs(head.objective)
+        return near and bool(np.max(np.abs(np.subtract(end.x, head.x)) / problem.scale) <= SAME_X)
+
+    counts: dict[StartEnd, int] = {}  # by the best end of each optimum
+    for end in feasible:
+        best = next((head for head in counts if is_same(end, head)), end)
+        counts[best] = counts.get(best, 0) + 1
+    return [
+        LocalOptimum(objective=head.objective, count=count, share=count / len(feasible), x=head.x)
+        for head, count in counts.items()
+    ]
+
+
+def bound_missed(starts: int) -> float:
+    """Return the largest share of starts, with 95 % confidence, that an optimum attracts which none of so many starts reached."""
+    return -math.expm1(math.log(1 - CONFIDENCE) / starts)

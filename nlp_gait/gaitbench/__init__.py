@@ -9,7 +9,7 @@ problem = gaitbench.generate("ssp", seed=3)  # the same as load("gb2:ssp:3"); ga
 """
 
 from nlp_gait.gaitbench.facts import Definition, Evidence, list_instances
-from nlp_gait.gaitbench.generated import list_families, list_test_seeds
+from nlp_gait.gaitbench.generated import list_families
 from nlp_gait.gaitbench.instance import Instance, generate, load
 
 __all__ = [
@@ -19,6 +19,5 @@ __all__ = [
     "generate",
     "list_families",
     "list_instances",
-    "list_test_seeds",
     "load",
 ]

@@ -13,7 +13,6 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import date
 from functools import cache
 
 import numpy as np
@@ -31,8 +30,6 @@ ID = re.compile(rf"{PREFIX}:([a-z0-9-]+):(0|[1-9][0-9]{{0,11}})")
 Range = tuple[float, float]
 MOST_VARIABLES = 400  # of a problem that becomes an instance by its name, if equations tie them
 STARTS = 20  # of IPOPT, for the best known point of such an instance
-# Training seeds are below, test seeds follow from a date: TEST_SEEDS * YYYYMMDD + number.
-TEST_SEEDS = 1000
 # The box, in units of the range of each variable: its width, the share of it that stays free on both sides of where the best
 # points of the family are, and the angle by which two variables are mixed [rad].
 WIDTHS: Range = (1.2, 1.6)
@@ -111,12 +108,6 @@ def parse_id(id: str) -> tuple[Family, Draw]:
     family, seed = match[1], int(match[2])
     make_id(family, seed)
     return load_families()[family], Draw(family=family, seed=seed)
-
-
-def list_test_seeds(day: date, count: int) -> tuple[int, ...]:
-    """Return the test seeds of a day; no training seed is among them."""
-    count = check_count("count", count, at_most=TEST_SEEDS)
-    return tuple(int(f"{day:%Y%m%d}") * TEST_SEEDS + k for k in range(count))
 
 
 def is_generated(id: str) -> bool:

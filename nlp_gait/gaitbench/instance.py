@@ -189,7 +189,7 @@ def generate(family: str, seed: int, *, unit_cube: bool = False) -> Instance:
 
     Args:
         family: one of ``list_families()``.
-        seed: 0 or above; test seeds (``list_test_seeds``) are disjoint from those for training.
+        seed: 0 or above.
         unit_cube: whether x runs from 0 to 1; generated instances always do.
 
     Raises UnknownNameError, or InputError if the seed is not a whole number from 0 to 1e12.

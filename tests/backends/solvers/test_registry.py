@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from compare.questions.local_optima import run_stored_starts
+from compare.questions.certainty import run_stored_starts
 from compare.questions.question import Work
 from compare.study.store import Store
 from nlp_gait.backends.optima.optimum import find_optimum

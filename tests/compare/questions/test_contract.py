@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import compare.questions
-from compare.questions import local_optima
+from compare.questions import certainty
 from compare.questions.certainty import Certainty
 from compare.questions.pareto.pareto import Pareto
 from compare.questions.prices import Prices
@@ -61,8 +61,8 @@ CASES = {
         line="variants nao-ssp --set intervals=2 --starts 1 --variant limits:motors=limits",
     ),
     "certainty": Case(
-        make=lambda: Certainty(problem=load("walk12"), starts=4, evaluations=300, time_limit_s=0.0),
-        line="certainty walk12 --starts 4 --evaluations 300 --time-limit 0",
+        make=lambda: Certainty(problem=load("walk12"), starts=4, time_limit_s=0.0),
+        line="certainty walk12 --starts 4 --time-limit 0",
     ),
     "prices": Case(
         make=lambda: Prices(problem=load("walk12"), starts=2), rows="limits", line="prices walk12 --starts 2"
@@ -114,7 +114,7 @@ def is_question(path: Path) -> bool:
 def test_an_interrupted_question_continues_to_the_same_answer(
     name: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(local_optima, "BATCH", 2)
+    monkeypatch.setattr(certainty, "BATCH", 2)
     whole = answer(name, Store(folder / name))
     steps = {path.name for path in (folder / name / "store").iterdir()}
     assert steps
