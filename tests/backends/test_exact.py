@@ -48,13 +48,6 @@ def test_what_is_maximised_costs_its_negative_and_is_indexed_as_it_is() -> None:
     assert out.indexes == pytest.approx({"cost": 3.0})
 
 
-def test_values_of_parameters_reach_the_function_without_rebuilding_it() -> None:
-    problem = toy(corner)
-    other = problem.with_values(**{"limit": 1.0, "x.lower": 0.5})
-    assert build_exact_model(other) is build_exact_model(problem)
-    assert evaluate(other, (0.0, 1.5)).violation == pytest.approx(10.0 + 0.5 / 4.0)
-
-
 def test_violated_rows_are_named_worst_first() -> None:
     rows = row_violations(toy(corner), np.array([-2.25, 1.0]))
     assert [(r.name, r.unit) for r in rows] == [("row", "m"), ("bounds[x]", "m")]

@@ -5,15 +5,13 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from casadi import MX
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import LiftedSenseError
-from nlp_gait.formulation import Constraint, load
-from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from tests.backends.toys import Mathematics, corner, row, toy
+from nlp_gait.formulation import load
+from tests.backends.toys import Mathematics, row, toy
 
 NAMES = ("nao-ssp", "nao-dsp")
 WIDTH = 1e-3
@@ -89,18 +87,3 @@ def test_lifting_along_the_sense_is_exact_at_the_optimum(mathematics: Mathematic
 def test_lifting_against_the_sense_is_an_error(mathematics: Mathematics, where: str) -> None:
     with pytest.raises(LiftedSenseError, match=f"toy: .*{where}.*the lifted NLP would be wrong"):
         build_nlp(toy(mathematics))
-
-
-def test_the_sense_of_the_objective_counts() -> None:
-    def mathematics(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
-        return ops.abs(x), ()
-
-    build_nlp(toy(mathematics, "minimise"))
-    with pytest.raises(LiftedSenseError):
-        build_nlp(toy(mathematics, "maximise"))
-
-
-def test_copies_with_other_values_share_one_nlp() -> None:
-    problem = toy(corner)
-    assert build_nlp(problem) is build_nlp(problem.with_values(limit=1.5)) is build_nlp(problem.fix(x=1.0))
-    assert build_nlp(problem) is not build_nlp(toy(corner))

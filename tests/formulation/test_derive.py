@@ -12,7 +12,7 @@ from compare.judge import evaluate
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable, load
+from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, Parameter, Point, Variable, load
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, toy
 from tests.evaluation import evaluated
@@ -118,15 +118,6 @@ def test_the_compiled_objective_and_the_judge_see_it(walk: GaitProblem) -> None:
     assert verdicts[0].dense is not None
 
 
-def test_another_objective_has_its_own_name_and_sense() -> None:
-    gain = Objective(name="gain", unit="J", sense="maximise")
-    flipped = toy(corner).derive(
-        objective=gain, change=lambda assembly, point, ops: replace(assembly, objective=-assembly.objective)
-    )
-    solution = nlp_gait.solve(flipped, starts=2)
-    assert (solution.problem.objective.name, solution.objective) == ("gain", pytest.approx(0.0, abs=1e-6))
-
-
 @pytest.mark.parametrize(
     ("more", "twice"),
     [
@@ -142,15 +133,6 @@ def test_another_objective_has_its_own_name_and_sense() -> None:
 def test_duplicated_names_are_refused(more: dict[str, Any], twice: str) -> None:
     with pytest.raises(InputError, match=f"problem 'toy': variables or parameters are duplicated: {twice}$"):
         toy(corner).derive(**more)
-
-
-@pytest.mark.slow
-def test_an_added_variable_leaves_a_richer_motion_unchanged() -> None:
-    """The swing foot halfway is a function of the phase's own variables alone."""
-    plain = load("nao-ssp", trajectory="quintic", samples_per_interval=1)
-    changed = with_slack(plain)
-    x = plain.start_point(np.random.default_rng(0))
-    assert evaluated(changed, np.append(x, 0.5)).cost == evaluated(plain, x).cost + 2.0 * 0.5
 
 
 def test_a_name_that_a_point_does_not_have_is_refused_with_those_that_it_has(walk: GaitProblem) -> None:

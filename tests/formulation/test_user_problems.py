@@ -124,11 +124,6 @@ def test_messages_say_what_is_wrong_with_the_file(text: str, message: str, tmp_p
         load(f"{tmp_path / 'none.py'}:leg")
 
 
-def test_a_number_is_a_bound() -> None:
-    row = Constraint(name="knee", unit="rad", scale=1.0, value=MX.sym("knee"), lower=0, upper=1.5)
-    assert [float(bound) for bound in row.columns[1:]] == [0.0, 1.5]
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

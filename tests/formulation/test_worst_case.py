@@ -31,12 +31,6 @@ def test_the_worst_scenario_is_optimised() -> None:
     assert [a.name for a in found.active_constraints if a.name.startswith("row")] == ["row@1"]
 
 
-def test_one_scenario_is_the_problem_itself() -> None:
-    problem = toy(target(1.0, 0.5))
-    alone, same = solve(make_worst_case([problem])), solve(problem)
-    assert alone.objective == pytest.approx(same.objective, abs=1e-9)
-
-
 def test_maximised_or_different_scenarios_are_refused() -> None:
     def hill(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
         return -(x**2), ()

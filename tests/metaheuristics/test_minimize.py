@@ -80,15 +80,6 @@ def test_interruption_carries_the_complete_generations() -> None:
     assert "30 evaluations" in str(caught.value)
 
 
-def test_interruption_before_the_first_generation_has_nothing_to_carry() -> None:
-    def function(X: Array) -> tuple[Array, Array]:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt) as caught:
-        minimize(Function(function, [0.0], [1.0]), SWARM)
-    assert not isinstance(caught.value, Interrupted)
-
-
 def test_the_objective_cannot_write_into_its_points() -> None:
     def function(X: Array) -> tuple[Array, Array]:
         X[:] = 0.0

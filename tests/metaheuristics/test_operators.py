@@ -14,30 +14,11 @@ from metaheuristics.algorithms.genetic import (
     hold_tournaments,
     mutate_polynomially,
 )
-from metaheuristics.algorithms.particle_swarm import ParticleSwarm, move, reflect
+from metaheuristics.algorithms.particle_swarm import ParticleSwarm
 from metaheuristics.algorithms.points import Points
 from metaheuristics.interface import FEASIBILITY, Start
 
 WIDE = 1e9  # bounds so far away that they do not bend a distribution
-
-
-def test_swarm_step() -> None:
-    # 0.5 * 0.2 + 0.3 + (-0.1) = 0.3; 0.5 * -0.4 + 1.0 + 0.4 = 1.2, limited to 1.
-    X, V = move(
-        np.array([[1.0, 2.0]]),
-        np.array([[0.2, -0.4]]),
-        np.array([[0.3, 1.0]]),
-        np.array([[-0.1, 0.4]]),
-        0.5,
-        np.array([1.0, 1.0]),
-    )
-    np.testing.assert_allclose(V, [[0.3, 1.0]])
-    np.testing.assert_allclose(X, [[1.3, 3.0]])
-
-
-def test_swarm_reflection_turns_only_the_velocity_that_left() -> None:
-    X, V = reflect(np.array([[1.5, 0.5, -2.0]]), np.array([[0.7, 0.7, -0.7]]), np.full(3, -1.0), np.full(3, 1.0))
-    assert X.tolist() == [[1.0, 0.5, -1.0]] and V.tolist() == [[-0.7, 0.7, 0.7]]
 
 
 def test_swarm_follows_the_source_particle_by_particle() -> None:
@@ -122,10 +103,6 @@ def test_flip_mutation_of_the_paper() -> None:
 def test_binary_tournaments_draw_every_parent_twice() -> None:
     winners = np.bincount(hold_tournaments(50, 50, 2, np.random.default_rng(0)), minlength=50)
     assert winners.sum() == 50 and winners[0] == 2 and winners[-1] == 0 and winners.max() == 2
-
-
-def test_tournaments_of_one_are_a_shuffle() -> None:
-    assert sorted(hold_tournaments(7, 7, 1, np.random.default_rng(0))) == list(range(7))
 
 
 def test_copies_survive_only_if_nothing_else_is_left() -> None:

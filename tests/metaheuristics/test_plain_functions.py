@@ -109,22 +109,3 @@ def test_objects_classes_and_makers_are_algorithms() -> None:
 def test_other_objects_are_rejected(own: Any, settings: dict[str, Any], message: str) -> None:
     with pytest.raises(SearchError, match=message):
         to_algorithm(own, "own", settings)
-
-
-def test_points_outside_the_bounds_are_refused_with_their_place() -> None:
-    class Careless(Plain):
-        def start(self, start: Any) -> Any:
-            self.X = start.initial
-            return self
-
-        def ask(self) -> Array:
-            return self.X
-
-        def tell(self, X: Array, *_: object) -> None:
-            self.X = X + 4.0
-
-        def stop(self) -> tuple[str, ...]:
-            return ()
-
-    with pytest.raises(SearchError, match="for variable 0 of point 0, outside the bounds -2.0..2.0: clip the points"):
-        minimize(Disk(), to_algorithm(Careless, "c"), evaluations=20)

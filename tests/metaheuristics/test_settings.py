@@ -82,13 +82,6 @@ def test_bad_settings(factory: Callable[..., object], settings: dict[str, object
         factory(**settings)
 
 
-@pytest.mark.parametrize(
-    "settings", [{"exponent": 0.1}, {"control": 0.1}, {"control": 1.0}, {"share": 0.0}, {"share": 1.0}]
-)
-def test_settings_at_the_edge_are_allowed(settings: dict[str, float]) -> None:
-    assert EpsilonLevel(**settings) != EpsilonLevel()
-
-
 @pytest.mark.parametrize("name", [*ALGORITHMS, *ADAPTERS])
 def test_lookup_by_name(name: str) -> None:
     algorithm = make_algorithm(name, population=12)

@@ -213,15 +213,6 @@ def test_slopes_cancel_what_intervals_count_twice() -> None:
     assert forms.upper[0, 1] - forms.lower[0, 1] < 1.1  # intervals give a width of 9
 
 
-def test_two_inputs_with_one_symbol_vary_together() -> None:
-    x = SX.sym("x", 2)
-    function = AffineFunction(ca.Function("f", [x], [x[1] - x[0]]))
-    box = np.array([[[0.0, 1.0], [0.5, 1.5]]])
-    together, apart = (function(box, np.array(symbols)) for symbols in ([0, 0], [0, 1]))
-    np.testing.assert_allclose([together.lower[0, 0], together.upper[0, 0]], 0.5, atol=1e-14)
-    np.testing.assert_allclose([apart.lower[0, 0], apart.upper[0, 0]], [-0.5, 1.5], atol=1e-14)
-
-
 def test_a_half_open_input_does_not_reach_its_upper_end() -> None:
     x = SX.sym("x")
     jump = ca.Function("f", [x], [SX(0.5 <= x)])  # noqa: SIM300  as splines ask

@@ -5,7 +5,6 @@ import pytest
 from casadi import MX
 
 from nlp_gait.backends.solve import Continuation, solve_both_ways
-from nlp_gait.backends.solvers import ipopt
 from nlp_gait.formulation import Constraint, GaitProblem
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, toy
@@ -51,19 +50,6 @@ def test_infeasible_problems_are_named_and_the_path_continues() -> None:
     assert costs == pytest.approx([0.0, 0.6, 1.5, 3.0], abs=TOLERANCE)
     # Random starts are in vain once: a warm and a cold attempt each way, and the two random ones.
     assert len(found[2].starts) == 2 * 2 + 2
-
-
-def test_nothing_is_rebuilt_along_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[object] = []
-    make = ipopt.Ipopt.__init__
-
-    def counted(self: ipopt.Ipopt, *arguments: object, **named: object) -> None:
-        made.append(self)
-        make(self, *arguments, **named)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(ipopt.Ipopt, "__init__", counted)
-    solve_both_ways(path(toy(corner), [0.5, 0.6, 0.7, 0.8]), starts=1)
-    assert len(made) == 1
 
 
 def test_a_warm_start_needs_fewer_iterations_than_a_cold_one() -> None:

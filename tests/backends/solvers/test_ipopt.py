@@ -71,17 +71,6 @@ def test_a_solution_accounts_for_its_work(single_support: tuple[GaitProblem, Sol
     assert [start["x0"] for start in written["starts"]] == [problem.by_name(start.x0) for start in solution.starts]
 
 
-@pytest.mark.slow
-def test_compiled_functions_in_the_cache_folder_do_not_change_a_solve() -> None:
-    def bowl() -> GaitProblem:
-        return toy(lambda x, y, limit, ops: (x**4 + y**2, (row(x * y, lower=limit),)))
-
-    first = solve(bowl(), starts=1, seed=0)
-    assert IpoptSettings(compiled=True).prepare(bowl()).compiled
-    assert not IpoptSettings().prepare(bowl()).compiled
-    assert solve(bowl(), starts=1, seed=0).starts[0].x.tolist() == first.starts[0].x.tolist()  # bit for bit
-
-
 @pytest.mark.parametrize(("limit", "objective", "price"), [(0.5, 0.0, None), (1.5, 1.5, 3.0)])
 def test_a_corner_by_hand(limit: float, objective: float, price: float | None) -> None:
     solution = solve(toy(corner).with_values(limit=limit), starts=2)

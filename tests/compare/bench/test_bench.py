@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 
 import pytest
 
@@ -16,8 +15,7 @@ from compare.bench.baseline import (
     list_drawn,
     load_baseline,
 )
-from compare.bench.leaderboard import make_leaderboard_page, rank_solvers
-from compare.report.writing import write_document
+from compare.bench.leaderboard import rank_solvers
 from nlp_gait import gaitbench
 
 
@@ -88,23 +86,6 @@ def test_a_solver_that_finds_nothing_is_last() -> None:
     last = board.standings[-1]
     assert (last.solver, last.solved, last.feasible, set(last.reached)) == ("nothing", 0.0, 0.0, {0})
     assert all(duel.wins == 0 for duel in count_wins(board.comparisons, "nothing"))
-
-
-@pytest.mark.slow
-def test_the_page_says_it(tmp_path: Path) -> None:
-    ids = ("walk12-w015", "ssp-v5")
-    twin = [replace(r, solver="twin") for id in ids for r in load_baseline(id) if r.solver == "pso"]
-    board = rank_solvers(ids, twin)
-    written = write_document(tmp_path, make_leaderboard_page(board, "twin", "two instances"), "leaderboard")
-    assert {path.name for path in written} >= {"leaderboard.html", "leaderboard.md", "gaitbench-runtime.svg"}
-    text = (tmp_path / "leaderboard.md").read_text(encoding="utf-8")
-    assert f"twin takes place {board.place('twin')} of 13" in text
-    for id in ids:
-        assert f"| {id} |" in text
-    assert "Holm-corrected" in text
-    assert "gaitbench-runtime" in (tmp_path / "leaderboard.html").read_text(encoding="utf-8") or "<svg" in (
-        tmp_path / "leaderboard.html"
-    ).read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

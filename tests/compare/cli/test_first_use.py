@@ -76,17 +76,6 @@ def test_the_python_of_the_readme_runs_as_pasted():
     assert found["optimum"].converged and found["result"].objective >= found["optimum"].objective
 
 
-def test_long_work_leaves_a_line_in_a_log_now_and_then(monkeypatch, capsys):
-    monkeypatch.setattr(printing, "LOG_PERIOD_S", 0.0)
-    monkeypatch.setattr(printing, "stderr", PlainConsole(stderr=True, highlight=False, markup=False))
-    with printing.show_progress("starts", 2) as advance:
-        advance("0.53 W")
-        advance("0.54 W")
-    assert re.fullmatch(
-        r"starts: 1 of 2 after 0 s; 0.53 W\nstarts: 2 of 2 after 0 s; 0.54 W\n", capsys.readouterr().err
-    )
-
-
 def test_a_broken_pipe_does_not_lose_the_solution_file(tmp_path):
     target = tmp_path / "best.json"
     command = f"{sys.executable} -P -m nlp_gait solve walk12 --starts 1 --out {target} | true"

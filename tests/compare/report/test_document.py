@@ -4,7 +4,7 @@ from pathlib import Path
 
 from compare.drawing.figures import make_figure
 from compare.report.document import Document, Figure, Prose, Section, Table
-from compare.report.writing import write_document, write_parts
+from compare.report.writing import write_document
 
 POWERS = Table(
     columns={"solver": "", "power [W]": ".2f", "feasible": ""},
@@ -33,12 +33,6 @@ def test_pages_are_rounded_for_people_and_files_are_not(tmp_path: Path) -> None:
     assert "<em>gaits</em>" in page and "<li>two</li>" in page and "<td>2</td>" in page
     assert page.count("<svg") == 1 and 'class="headline"' not in page
     assert files[2].read_text() == f"solver,power [W],feasible\nga|<b>,{1 / 3!r},true\npso,,false\n"
-
-
-def test_tables_and_figures_can_be_written_alone(tmp_path: Path) -> None:
-    unnamed = Table(columns={"a": ""}, rows=[[1]])
-    written = write_parts(tmp_path, ["a paragraph", unnamed, Section(title="inner", parts=[POWERS])])
-    assert written == list(tmp_path.iterdir()) == [tmp_path / "powers.csv"]
 
 
 def test_markup_in_the_programs_own_text_is_no_html(tmp_path: Path) -> None:

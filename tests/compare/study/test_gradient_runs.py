@@ -10,10 +10,8 @@ import pytest
 import nlp_gait
 from compare.study.run_task import run_task
 from compare.study.task import ProblemSpec, Stop, Task
-from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solvers import nlpsol
 from nlp_gait.backends.solvers.registry import make_solver
-from nlp_gait.backends.solvers.solver import IterationWatch
 from nlp_gait.errors import InputError, UnknownNameError
 
 SSP = ProblemSpec(name="nao-ssp")
@@ -48,18 +46,6 @@ def test_other_nlp_solvers_reach_the_same_optimum(name: str) -> None:
     assert record.verdict.objective == pytest.approx(OPTIMUM, rel=1e-5)
     assert record.verdict.violation < 1e-5  # fatrop relaxes bounds by more than the judge's 1e-6, and is told so
     assert record.evaluations["f"] > 0 and record.evaluations["gradient"] > 0
-
-
-def test_an_error_of_another_nlp_solver_ends_the_start_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(**given: object) -> None:
-        raise RuntimeError(
-            "Error in Function::call for 'uno':\n.../nlpsol.cpp:891: An exception was raised in the solver."
-        )
-
-    monkeypatch.setattr(nlpsol, "_build_solver", lambda *given: (fail, IterationWatch(build_nlp(given[0]).nlp), 0.0))
-    problem = ProblemSpec(name="walk12", values={"lambda": 0.51}).load()
-    outcome = nlpsol.Nlpsol(plugin="uno").run(problem, (problem.lower + problem.upper) / 2)
-    assert not outcome.claimed and outcome.status == "uno returned 'An exception was raised in the solver.'"
 
 
 @pytest.mark.slow

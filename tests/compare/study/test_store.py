@@ -56,15 +56,6 @@ def test_a_result_of_a_problem_that_evaluates_to_other_values_is_recomputed(tmp_
     assert store.load("one", {**walk, "probes": probes}) is MISSING
 
 
-def test_an_interrupted_computation_leaves_no_file(tmp_path: Path) -> None:
-    def interrupt() -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        Store(tmp_path).compute("one", {}, interrupt)
-    assert not list_files(tmp_path)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2, None])
 def test_several_results_are_stored_one_by_one_by_any_number_of_workers(jobs: int | None, tmp_path: Path) -> None:

@@ -289,17 +289,3 @@ def test_leftovers_of_a_killed_process_go(tmp_path: Path) -> None:
     os.utime(ahead, (time.time() + 86_400.0,) * 2)
     remove_leftovers(tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {new.name, record.name, *others}
-
-
-def swallow(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
-    with suppress(KeyboardInterrupt):
-        signal.raise_signal(signal.SIGINT)
-    f(lower[None])
-
-
-@pytest.mark.slow
-def test_an_interrupt_that_a_solver_swallows_ends_the_study_without_a_record(tmp_path: Path) -> None:
-    before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt):
-        run_study(Study(tasks=(Task(problem=SSP, solver=swallow, stop=Stop(evaluations=100)),), folder=tmp_path))
-    assert not list(tmp_path.rglob("records/*/*.json")) and signal.getsignal(signal.SIGINT) is before
