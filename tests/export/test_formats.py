@@ -2,7 +2,6 @@
 
 import csv
 import json
-import xml.etree.ElementTree as Xml
 
 import numpy as np
 import pytest
@@ -114,14 +113,6 @@ def test_keyframes_put_the_engine_into_the_planned_poses(result, tmp_path):
         for side in ("left", "right"):
             np.testing.assert_allclose(data.site(side).xpos, arrays[f"{side}_foot"][k], atol=1e-5)
         np.testing.assert_allclose(data.ctrl, data.actuator_length, atol=1e-12)
-
-
-def test_mjcf_is_the_whole_robot(result, tmp_path):
-    path = tmp_path / "nao.xml"
-    write_as("mjcf", path, result, 40)
-    root = Xml.parse(path).getroot()
-    assert root.get("model") == "nao-v5"
-    assert sum(float(e.get("mass")) for e in root.iter("inertial")) == pytest.approx(5.30535)
 
 
 def test_what_a_problem_has_not_is_refused(tmp_path):

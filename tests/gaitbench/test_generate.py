@@ -9,7 +9,7 @@ from scipy.stats import kstest
 
 from nlp_gait import gaitbench
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import load
 from nlp_gait.gaitbench.best_known import evaluate_interpreted
 from nlp_gait.gaitbench.generated import Draw, draw_box, draw_definition, load_families
@@ -62,13 +62,6 @@ def test_published_values_never_change(walk: gaitbench.Instance) -> None:
 def test_malformed_ids_are_refused(id: str) -> None:
     with pytest.raises(InputError, match="gb2:FAMILY:SEED"):
         gaitbench.load(id)
-
-
-def test_unknown_families_and_seeds_are_refused() -> None:
-    with pytest.raises(UnknownNameError, match="did you mean 'ssp"):
-        gaitbench.generate("sssp", 0)
-    with pytest.raises(InputError, match="seed"):
-        gaitbench.generate("ssp", -1)
 
 
 def test_other_variables_keep_objective_rows_and_feasible_set() -> None:

@@ -121,16 +121,6 @@ def test_derivatives_are_those_of_central_differences(id: str, unit_cube: bool) 
         instance.gradient(x[:-1])
 
 
-def test_the_unit_cube_is_the_same_problem() -> None:
-    instance, unit = gaitbench.load("ssp-v5"), gaitbench.load("ssp-v5", unit_cube=True)
-    Z = np.random.default_rng(0).random((50, len(unit.names)))
-    X = instance.lower + Z * (instance.upper - instance.lower)
-    np.testing.assert_array_equal(unit(Z)[0], instance(X)[0])
-    np.testing.assert_array_equal(unit.rows(Z), instance.rows(X))
-    assert (unit.lower == 0.0).all() and (unit.upper == 1.0).all() and set(unit.units) == {"1"}
-    assert unit(unit.best_x[None])[0][0] == pytest.approx(instance.best_known, rel=1e-12)
-
-
 def test_a_constant_is_not_a_variable() -> None:
     """A phase of one second: the time is gone from x, and the same power comes out as with it."""
     instance = gaitbench.load("ssp-v5-time10")

@@ -22,13 +22,12 @@ from nlp_gait.gaits.biped.footholds import (
 )
 from nlp_gait.gaits.biped.walk_sections import start_from_cycle
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
-from nlp_gait.gaits.humanoid.turning import find_sharpest_turn, find_stiff_joint, list_turn
+from nlp_gait.gaits.humanoid.turning import find_sharpest_turn, list_turn
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import Addresses, load_mujoco
 from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan, make_plan
-from tests.robots.crooked import crooked
 
 STEPS, TURN_DEG, LENGTH_M = 4, 24.0, 0.12
 
@@ -166,14 +165,6 @@ def test_the_sharpest_turn_names_its_limit(body: Humanoid) -> None:
     with pytest.raises(InputError, match=r"the sharpest with steps of 0.04 m is .*; take more steps"):
         list_turn(body, 2 * sharpest.turn_deg + 2, 3, 0.08)
     assert len(parse_footholds(list_turn(body, 40.0, None, None))) == 4
-
-
-def test_a_hip_joint_limits_the_angle_between_the_feet(tmp_path: Path) -> None:
-    pytest.importorskip("lxml")
-    biped = make_humanoid(crooked(tmp_path)).biped
-    assert find_stiff_joint(biped, 0.0) is None
-    joint, allowed = find_stiff_joint(biped, math.pi) or ("", 0.0)
-    assert joint in biped.joints and 0.0 < allowed < math.pi
 
 
 @pytest.mark.parametrize(

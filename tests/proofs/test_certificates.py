@@ -50,12 +50,6 @@ def test_a_least_power_form_that_differs_from_the_exact_functions_is_refused() -
         make_bounds(replace(problem, power_form=lambda _: replace(form, indexes=indexes)))
 
 
-def test_other_mathematics_has_no_least_power_form() -> None:
-    assert nlp_gait.load("nao-dsp", trajectory="quintic").power_form is None
-    assert load("nao-dsp").with_values(reach_margin=0.02).power_form is not None
-    assert load("nao-dsp").derive(change=lambda assembly, point, ops: assembly).power_form is None
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["dsp-v5", "walk12-lambda-1"])
 def test_a_random_path_of_a_shipped_proof_ends(name: str) -> None:

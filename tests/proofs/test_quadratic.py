@@ -65,12 +65,6 @@ def test_mixed_products_are_kept_and_cancel() -> None:
     assert max(abs(forms.lower[0, 0]), abs(forms.upper[0, 0])) < 1e-12
 
 
-def test_what_is_undefined_on_part_of_a_box_has_no_form() -> None:
-    x = SX.sym("x")
-    forms = QuadraticFunction(ca.Function("f", [x], [ca.vertcat(1 / x, ca.sqrt(x))]))(np.array([[[-1.0, 1.0]]]))
-    assert np.isinf(forms.error).all() and np.isinf(forms.lower).all() and np.isinf(forms.upper).all()
-
-
 def test_an_operation_without_a_form_is_refused() -> None:
     x = SX.sym("x")
     with pytest.raises(InputError, match="has no quadratic form"):

@@ -184,13 +184,6 @@ def test_a_link_that_matters_is_taken_from_the_robot_file(tmp_path: Path) -> Non
     assert robot.links["A_knee_link"].mass_kg == 1.1
 
 
-def test_a_sole_without_collision_shape_is_that_of_the_visual_shape(tmp_path: Path) -> None:
-    shown = load_robot(crooked(tmp_path, crooked_urdf().replace("collision>", "visual>")))
-    (tmp_path / "whole").mkdir()
-    assert shown.feet == load_robot(crooked(tmp_path / "whole")).feet
-    assert sum("lowest points of its visual shapes" in note for note in shown.notes) == 2
-
-
 def test_a_foot_behind_a_fixed_joint_is_found(tmp_path: Path) -> None:
     soles = ""
     for x in "AB":
@@ -199,14 +192,6 @@ def test_a_foot_behind_a_fixed_joint_is_found(tmp_path: Path) -> None:
     text = crooked_urdf().replace("</robot>", soles + "</robot>")
     named = override(crooked(tmp_path, text), feet={"left": {"link": "A_sole"}, "right": {"link": "B_sole"}})
     assert load_robot(named).feet["left"].link == "A_ankle_roll_link"
-
-
-def test_legs_of_another_number_of_joints_are_counted(tmp_path: Path) -> None:
-    text = crooked_urdf()
-    for x in "AB":
-        text = text.replace(f'<joint name="{x}_knee" type="revolute">', f'<joint name="{x}_knee" type="fixed">')
-    with pytest.raises(RobotDataError, match=r"'A_.*_link' and 'B_.*_link', has legs of 5 joints"):
-        load_robot(crooked(tmp_path, text))
 
 
 def test_knees_without_a_clear_range_bend_forward(tmp_path: Path, robot: Robot) -> None:

@@ -48,16 +48,6 @@ def test_a_robot_is_named_by_its_file_or_folder(packages: Path) -> None:
         load_robot("some-robots:lonly")
 
 
-def test_files_of_one_name_in_folders_of_one_name_are_named_by_both(packages: Path) -> None:
-    files = ("a/urdf/first.urdf", "a/urdf/second.urdf", "b/raw/first.urdf", "b/raw/second.urdf")
-    for file in files:
-        write(packages / file, crooked_urdf())
-    install(packages, "twice", *files)
-    with pytest.raises(UnknownNameError, match=r"known: raw/first, raw/second, urdf/first, urdf/second(;|$)"):
-        find_robot_file("twice:none")
-    assert Path(find_robot_file("twice:raw/second")) == packages / "b" / "raw" / "second.urdf"
-
-
 def test_mjcf_files_are_robots_and_scenes_and_other_xml_files_are_not(packages: Path) -> None:
     write(packages / "m/robot.xml", "<!-- a robot --><mujoco/>")
     write(packages / "m/scene.xml", "<mujoco><include file='robot.xml'/></mujoco>")

@@ -17,11 +17,6 @@ from compare.report.study_report import make_study_document
 from compare.report.writing import render_markdown, render_page
 from compare.study.settings import Manifest, Session, SolverSpec, StudySettings
 from compare.study.task import ProblemSpec
-from nlp_gait.formulation import Signals
-from nlp_gait.robots import load_robot
-from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import make_plan_model
-from nlp_gait.simulation.plan import Plan
 from tests.compare.records import study
 
 SCRIPT = "<script>alert(1)</script>"
@@ -102,15 +97,6 @@ def test_text_in_figures_is_escaped() -> None:
     page = Page()
     page.feed(inline_svg(svg, "f1", "figure 1"))
     assert "script" not in page.tags and "img" not in page.tags and SCRIPT in page.text
-
-
-def test_names_of_robots_are_escaped_in_models() -> None:
-    robot = replace(load_robot("nao-v5"), name=f"{QUOTED}{SCRIPT}&")
-    still = Signals(joints=tuple(robot.joints), arrays={}, columns={})
-    plan = Plan(robot=robot, full_robot=robot, signals=still, heat_loss=0.0, gravity=9.81)
-    root = ElementTree.fromstring(make_plan_model(plan, Drive()))
-    assert root.get("model") == f"{QUOTED}{SCRIPT}&"
-    assert not list(root.iter("script"))
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """The generated model: masses, limits, shapes."""
 
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -74,17 +73,3 @@ def test_without_the_extra_one_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'nlp-gait\[sim\]'"):
         load_mujoco()
-
-
-def _tensor(link):
-    ixx, iyy, izz, ixy, ixz, iyz = link.inertia_com_kgm2
-    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-
-
-def test_the_engine_takes_a_link_without_extent():
-    """A URDF may have zeros for a tensor: a point."""
-    links = {**NAO.links, "Head": replace(NAO.links["Head"], inertia_com_kgm2=(0.0,) * 6)}
-    engine = pytest.importorskip("mujoco")
-    model = engine.MjModel.from_xml_string(make_plan_model(plan_of(replace(NAO, links=links)), Drive()))
-    assert 0.0 < model.body("Head").inertia.max() < 1e-6
-    assert model.body("Head").mass == pytest.approx(NAO.links["Head"].mass_kg)

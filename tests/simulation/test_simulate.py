@@ -62,14 +62,6 @@ def test_the_swing_foot_lands_where_planned(simulated):
     assert simulated("dsp optimum")[2].landings == {}
 
 
-def test_the_floor_carries_the_robot(simulated):
-    plan, trace, _ = simulated("ssp optimum")
-    resting = trace.t > trace.t[-1] - 0.1
-    assert trace.loads[resting].sum(axis=1).mean() == pytest.approx(plan.robot.mass_kg * plan.gravity, rel=0.01)
-    middle = np.abs(trace.t - 2.0) < 0.2
-    assert (trace.loads[middle, 1] == 0.0).all()  # the right foot swings
-
-
 def test_an_infeasible_gait_falls_and_is_reported(gait):
     plan = make_plan(gait("ssp falling"))
     sole_edge = 0.05 + plan.robot.feet["left"].left_m

@@ -116,15 +116,6 @@ def test_feet_stand_when_they_are_planned_to(cycle: Result) -> None:
     assert plan.stands("right", times).tolist() == [0, 1, 1, 1, 1]
 
 
-def test_a_fall_leaves_no_distance(cycle: Result) -> None:
-    swaying = Result(problem=cycle.problem, x=cycle.x.copy())
-    swaying.x[cycle.problem.variable_index("hip_vy_lift_off_m_s")] = 1.5  # over the edge of the foot
-    plan = make_plan(swaying, 2)
-    found = measure_walk(plan, simulate_plan(plan), Drive(), 2)
-    assert found.measurements.fallen and found.steps_done <= 2
-    assert (found.walked_m, found.drift_m, found.heading_deg, found.engine_J_per_m) == (None, None, None, None)
-
-
 @pytest.mark.parametrize("steps", [0, -1, True, 1.0])
 def test_a_wrong_number_of_steps_is_refused(signals: Signals, steps: int) -> None:
     with pytest.raises(InputError, match="steps must be a whole number >= 1"):

@@ -77,3 +77,9 @@ def test_a_function_of_a_motion_by_the_chain_rule() -> None:
     assert velocity == pytest.approx([2 * 2 * 3 * 1 + 4 * -1, -cos])
     # a^2 b: 2 (a'^2 + a a'') b + 4 a a' b' + a^2 b''
     assert acceleration == pytest.approx([2 * (9 + 20) * 1 + 4 * 2 * 3 * -1 + 4 * 1, cos - sin])
+
+
+def test_a_path_off_the_origin_is_lifted_between_its_own_ends() -> None:
+    """From 1 to 3, at 1.5 with rate 2 and bend 4: offset -1/2, rate 2, bend 4 in halves of the path."""
+    lift = parabola_lift(Motion(SX(1.5), SX(2.0), SX(4.0)), 1.0, 3.0, SX(0.1))
+    assert [float(part) for part in lift] == pytest.approx([0.1 * 0.75, 0.1 * 2.0, -0.2 * (4.0 - 2.0)], abs=TOLERANCE)

@@ -12,8 +12,6 @@ from scipy.stats import mannwhitneyu
 from compare.analysis.best_known import compute_gap
 from compare.analysis.pairs import describe_power
 from compare.analysis.record_statistics import (
-    ECDF_TARGETS,
-    TARGETS,
     Curve,
     approximate_rank_sum,
     compute_a12,
@@ -170,12 +168,6 @@ def test_holm_lies_between_none_and_bonferroni_and_keeps_the_order(p: list[float
     adjusted = correct_by_holm(p)
     assert (adjusted >= np.array(p)).all() and (adjusted <= np.minimum(len(p) * np.array(p), 1.0) + 1e-15).all()
     assert (np.diff(adjusted[np.argsort(p, kind="stable")]) >= 0.0).all()
-
-
-def test_targets_are_what_the_documentation_says() -> None:
-    assert TARGETS == (1e-2, 1e-3, 1e-4, 1e-6)
-    assert (len(ECDF_TARGETS), ECDF_TARGETS[0], ECDF_TARGETS[-1]) == (31, 1.0, pytest.approx(1e-6))
-    assert np.diff(np.log10(ECDF_TARGETS)) == pytest.approx(np.full(30, -0.2))
 
 
 def test_best_known_is_the_best_that_the_judge_accepts() -> None:

@@ -33,11 +33,6 @@ MARKET = typer.Typer()
 MARKET.command()(weigh)
 
 
-def test_a_group_comes_as_one_object_from_its_own_options() -> None:
-    assert RUN.invoke(MARKET, ["apple"]).stdout == "100 g of apple\n"
-    assert RUN.invoke(MARKET, ["--loud", "--weight", "20", "plum", "--count", "3"]).stdout == "60 g of plum!\n"
-
-
 @pytest.mark.parametrize(
     ("arguments", "status", "words"),
     [

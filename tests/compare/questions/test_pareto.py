@@ -6,7 +6,7 @@ import pytest
 import nlp_gait
 from compare.judge import evaluate
 from compare.questions.pareto.competing import MARGINS, make_competing_objective
-from compare.questions.pareto.front import FrontPoint, find_knees, select_front, solve_front
+from compare.questions.pareto.front import FrontPoint, find_knees, solve_front
 from compare.questions.pareto.pareto import Pareto, SearchFront, compute_qualities
 from compare.questions.question import find
 from nlp_gait.errors import InputError, UnknownNameError
@@ -43,11 +43,6 @@ def test_two_corners_with_a_flatter_piece_between_are_two_knees() -> None:
 def test_an_arc_has_no_knee() -> None:
     angles = np.linspace(0.0, np.pi / 2, 60)
     assert find_knees(points([(float(np.sin(a)), float(1 - np.cos(a))) for a in angles])) == ()
-
-
-def test_dominated_points_go() -> None:
-    kept = select_front(points([(0.0, 1.0), (0.5, 3.0), (1.0, 2.0), (1.0, 2.5), (2.0, 4.0)]))
-    assert [(p.value, p.power_W) for p in kept] == [(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)]
 
 
 @pytest.mark.usefixtures("without_compiler")

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from compare.analysis.units import format_quantity, make_axis_label
 from compare.questions.question import Work, find
 from compare.questions.sweep import MOST_POINTS, Axis, Sweep, parse_axis, plot_sweep
 from compare.questions.swept_walks import SweepPoint
@@ -118,13 +117,6 @@ def test_infeasible_points_are_kept_and_named(tmp_path: Path) -> None:
     assert [math.isnan(y) for y in line.get_ydata()] == [False, False, True]
     assert list(cross.get_xdata()) == [0.09]
     assert axes.get_xlabel() == "dbm y mean limit [m]" and axes.get_ylabel() == "least power [W]"
-
-
-def test_labels() -> None:
-    assert make_axis_label("hip_vx_start_m_s", "m/s") == "hip vx start [m/s]"
-    assert make_axis_label("reach_margin", "1") == "reach margin"
-    assert make_axis_label("hip_height_m.upper", "m") == "upper bound of hip height [m]"
-    assert format_quantity("hip_height_m", "m", 0.31) == "hip height = 0.31 m"
 
 
 def test_a_sweep_is_as_large_as_its_grid() -> None:

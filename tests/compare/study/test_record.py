@@ -16,7 +16,7 @@ from compare.judge import evaluate
 from compare.study.record import History, RunRecord, Times, read_record
 from compare.study.record_files import read_records, write_record
 from compare.study.run_study import Study, check_study, run_study
-from compare.study.run_task import MOST_HISTORY, _choose_entries, try_task
+from compare.study.run_task import try_task
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation.registry import check_mathematics
@@ -113,15 +113,6 @@ def test_bounds_that_are_nan_are_rejected_or_never_satisfied(end: str, bound: Ca
     later = toy(lambda x, y, limit, ops: (x * y, (row(x, **{end: limit.sqrt()}),))).with_values(limit=-1.0)
     found = evaluate(later, [0.1, 0.2])
     assert not found.feasible and math.isnan(found.violation)
-
-
-@pytest.mark.slow
-def test_long_histories_keep_their_changes_and_their_end() -> None:
-    assert _choose_entries([1.0] * MOST_HISTORY) == list(range(MOST_HISTORY))
-    flat: list[float | None] = [None] * 700_000 + [3.0] * 500_000 + [2.0] * 100_000
-    assert _choose_entries(flat) == [0, 700_000, 1_200_000, len(flat) - 1]
-    steady = _choose_entries([-float(k) for k in range(1_300_000)])
-    assert len(steady) <= MOST_HISTORY + 1 and steady[0] == 0 and steady[-1] == 1_299_999
 
 
 def test_an_algorithm_that_changes_the_working_folder_keeps_its_run(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from nlp_gait import IpoptSettings, load, solve
+from nlp_gait import load
 from nlp_gait.errors import InputError
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
@@ -50,17 +50,6 @@ def test_power_is_that_of_the_time_histories(features: str) -> None:
     else:
         heat = 0.025 * (torque**2).sum(axis=1)
     assert evaluated(problem, X).cost == pytest.approx(float(mean(driven.sum(axis=1) + heat)), rel=1e-9)
-
-
-@pytest.mark.slow
-def test_a_flat_battery_binds() -> None:
-    """At a fifth of the voltage the knee's torque at the optimum is beyond what its motor gives."""
-    problem = load("nao-dsp", motors="limits", intervals=5)
-    solver = IpoptSettings(few_rows=False, hessian="limited-memory")
-    weak = solve(problem.with_values(supply_share=0.18), solver=solver)
-    assert weak.converged
-    assert any(a.name.startswith("torque_") and "[" in a.name for a in weak.active_constraints)
-    assert weak.objective > solve(problem, solver=solver).objective + 1e-4
 
 
 def test_both_are_simulated_with_the_rotors_of_the_plan() -> None:

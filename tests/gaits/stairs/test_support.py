@@ -46,15 +46,6 @@ def test_torques_and_pressure_are_those_of_the_flat_stance_foot() -> None:
     assert max(shares) > 0.05 and shares[-1] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_the_printed_zmp_differs_by_the_spin_of_links_only() -> None:
-    polygon, feet = (nlp_gait.load("stairs-plan", balance=rule, intervals=16) for rule in ("polygon", "feet"))
-    arrays = polygon.signals(np.array(NEAR_BEST)).arrays
-    ours = feet.signals(np.array([*NEAR_BEST, 0.1])).arrays
-    apart = np.abs(arrays["zmp"] - ours["zmp"])
-    assert 0.0 < apart.max() < 0.02
-    assert np.ptp(ours["support"]) == 0.0 and polygon.names == feet.names[:-1]
-
-
 def test_power_of_all_joints_is_the_change_of_mechanical_energy() -> None:
     """Ground forces act on points that stand still."""
     parts = 200

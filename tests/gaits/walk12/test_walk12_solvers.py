@@ -31,13 +31,6 @@ def test_ipopt_from_random_starts(row: tuple[float, ...]) -> None:
     assert np.median([start.iterations for start in solution.starts]) < START_ITERATIONS
 
 
-@pytest.mark.parametrize("hessian", ["exact", "limited-memory"])
-def test_the_corner_is_no_trap(hessian: str) -> None:
-    settings = nlp_gait.IpoptSettings(hessian=hessian)
-    solution = solve(PROBLEM.with_values(**{"lambda": 0.15}), x0=[0.13] * 4, solver=settings)
-    assert solution.objective == pytest.approx(0.9708, abs=OPTIMUM_TOLERANCE)
-
-
 @pytest.mark.slow
 def test_largest_f1_of_the_model() -> None:
     """Whatever the normalisation that the problem carries."""
