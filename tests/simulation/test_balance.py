@@ -133,16 +133,6 @@ def test_bumps_noise_and_delay_act_and_the_same_seed_gives_the_same_walk(plan: P
     assert not np.array_equal(first, other) and not np.array_equal(first, flat)
 
 
-@pytest.mark.slow
-def test_a_fork_that_is_not_pushed_ends_as_the_simulation_it_left(plan: Plan) -> None:
-    run = Run(plan, drive=Drive(balance=Balance(noise=1.0)))
-    run.advance(0.5)
-    fork, pushed = (run.fork(Push(impulse_Ns=(impulse, 0.0), start_s=0.5)) for impulse in (0.0, 1.0))
-    end = advance(fork)
-    np.testing.assert_array_equal(advance(run), end)
-    assert not np.array_equal(advance(pushed), end)
-
-
 def test_settings_that_are_not_allowed_are_refused() -> None:
     for name, value in (("dcm_gain", -1.0), ("edge", float("nan")), ("period_s", 2.0)):
         with pytest.raises(InputError, match=f"{name} of a balance feedback must be"):

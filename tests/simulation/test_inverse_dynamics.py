@@ -32,13 +32,6 @@ def test_rotors_weigh_alike_in_plan_and_engine(gait, name):
     assert np.abs(engine_torques(without, signals) - signals.arrays["tau"]).max() > 0.05
 
 
-def test_lever_rule_and_fast_motion(gait):
-    result = gait("dsp optimum", torso_share="lever")
-    result.x[-1] = 0.3  # accelerations fifty times as large
-    signals = result.problem.signals(result.x)
-    np.testing.assert_allclose(engine_torques(result, signals), signals.arrays["tau"], atol=AGREEMENT_NM)
-
-
 def test_a_wrong_mass_is_noticed(gait):
     """The oracle is not blind: another robot's torques differ by far more than rounding."""
     v5, v6 = gait("ssp optimum"), gait("ssp optimum", robot="nao-v6")

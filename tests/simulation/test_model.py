@@ -73,3 +73,8 @@ def test_without_the_extra_one_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'nlp-gait\[sim\]'"):
         load_mujoco()
+
+
+def _tensor(link):
+    ixx, iyy, izz, ixy, ixz, iyz = link.inertia_com_kgm2
+    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.gaits.stairs.display import compute_ground_force, compute_joint_torques
 from nlp_gait.gaits.stairs.planar_biped import MOVING, make_loads
@@ -120,11 +119,6 @@ def test_a_lean_that_changes_gives_the_torso_a_spin() -> None:
     assert plan.spin_at_start[1] == pytest.approx(1.5 * rate[0] - 0.5 * rate[1], rel=1e-3)
     assert abs(plan.spin_at_start[1]) > 1e-3
     np.testing.assert_allclose(plan.torso_axis(np.zeros(1))[0], [np.sin(lean[0]), 0.0, np.cos(lean[0])], atol=1e-12)
-
-
-def test_a_step_that_does_not_end_as_it_began_is_not_repeated(climb: Result) -> None:
-    with pytest.raises(InputError, match="'stairs-plan' is not a cycle that can be repeated"):
-        make_plan(climb, 2)
 
 
 def test_gravity_is_compensated_by_the_torques_that_hold_the_posture_over_the_foremost_foot(climb: Result) -> None:

@@ -55,13 +55,6 @@ def test_the_measured_power_is_the_predicted_one_and_keeps_the_order(simulated):
     assert optimum.predicted.total_W == pytest.approx(0.846, abs=0.002)
 
 
-def test_the_swing_foot_lands_where_planned(simulated):
-    landing = simulated("ssp optimum")[2].landings["right"]
-    assert landing.planned_m == pytest.approx((0.12, -0.05))
-    assert landing.error_m < 0.010
-    assert simulated("dsp optimum")[2].landings == {}
-
-
 def test_an_infeasible_gait_falls_and_is_reported(gait):
     plan = make_plan(gait("ssp falling"))
     sole_edge = 0.05 + plan.robot.feet["left"].left_m

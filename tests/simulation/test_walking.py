@@ -120,11 +120,3 @@ def test_feet_stand_when_they_are_planned_to(cycle: Result) -> None:
 def test_a_wrong_number_of_steps_is_refused(signals: Signals, steps: int) -> None:
     with pytest.raises(InputError, match="steps must be a whole number >= 1"):
         repeat_steps(signals, load_nao("nao-v5"), steps)
-
-
-def test_a_phase_cannot_be_repeated(gait) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(
-        InputError,
-        match="problem 'nao-ssp' is not a cycle that can be repeated; leave out the number of steps",
-    ):
-        make_plan(gait("ssp optimum"), 2)

@@ -73,11 +73,6 @@ def test_every_spline_is_one_with_more_spans_whose_coefficients_are_averages(see
     assert np.abs(more).max() <= np.abs(coefficients).max() + TOLERANCE
 
 
-def test_a_curve_that_does_not_move_becomes_a_spline_of_zeros() -> None:
-    assert not refine_spline(np.zeros((0, 3)), 4).any()
-    assert refine_spline(np.zeros((0, 3)), 4).shape == (5, 3)
-
-
 def test_a_quintic_with_still_ends_is_found_by_fitting() -> None:
     """By hand: s^2 (1 - s)^2 (2 - 3 s)."""
     values = PHASES**2 * (1 - PHASES) ** 2 * (2 - 3 * PHASES)

@@ -34,15 +34,6 @@ def test_the_bound_of_a_constrained_problem_is_proven_and_just() -> None:
     assert certificate.gap == pytest.approx(1e-4)
 
 
-def test_a_maximum_is_bounded_from_above() -> None:
-    def hill(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
-        return 5 - x**2 - (y - 1) ** 2, (row(x, upper=limit),)
-
-    certificate = certify(toy(hill, "maximise"), np.array([0.0, 1.0]), tolerance=1e-3, time_limit_s=60.0)
-    assert certificate.closed
-    assert certificate.bound == pytest.approx(5.005)
-
-
 def test_an_infeasible_incumbent_is_refused() -> None:
     with pytest.raises(InputError, match="infeasible"):
         certify(toy(two_valleys, limit=2.0), np.array([0.0, 0.0]))

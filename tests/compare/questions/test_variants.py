@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -95,12 +94,3 @@ def test_the_command_reports_what_each_feature_of_the_motors_changes(tmp_path: P
     assert limited["unchanged_violation"] == 0.0
     assert heated["objective"] < heated["unchanged"] and heated["as_first"] > published["objective"]
     assert [v["name"] for v in answer["variants"]] == ["as given", "limits", "K"]
-
-
-def test_values_of_an_option_of_any_problem(tmp_path: Path) -> None:
-    answer = run(
-        "nao-dsp", "--over", "step_length_m=0.05,0.06", "--set", "intervals=2", "--starts", "1", "--out", str(tmp_path)
-    )
-    short, long = answer["variants"]
-    assert short["options"] == {"step_length_m": 0.05} and short["objective"] < long["objective"]
-    assert np.isfinite(short["moved"])

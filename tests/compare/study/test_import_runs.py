@@ -83,13 +83,6 @@ def test_a_damaged_file_is_refused_by_its_line(text: str, message: str, tmp_path
         read_points(tmp_path / "x.csv", PROBLEM)
 
 
-def test_missing_settings_of_a_run_are_requested(tmp_path: Path) -> None:
-    with pytest.raises(GaitError, match="--as takes letters"):
-        import_runs(WALK, finals(tmp_path), "../ga", evaluations=3)
-    with pytest.raises(GaitError, match="unknown column of .* 'objectiv'; did you mean .*'objective'"):
-        import_runs(WALK, finals(tmp_path, extra={"objectiv": [1, 2, 3]}), "ga", evaluations=3)
-
-
 @pytest.mark.slow
 def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_path: Path) -> None:
     out = tmp_path / "study"

@@ -16,10 +16,6 @@ from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs.certificate import find_certificate, load_certificates
 
 
-def of_instance(id: str) -> Reference:
-    return find_reference(identify_problem(gaitbench.load(id).gait_problem))
-
-
 def test_every_shipped_value_has_the_bound_of_its_tightest_certificate() -> None:
     """Else run ``python -m benchmarks.best_known``."""
     certificates, named = load_certificates(), set[str]()
@@ -51,20 +47,6 @@ def test_a_generated_instance_has_its_own_point_unless_a_parameter_is_changed() 
     assert known.x == tuple(instance.best_x) and known.source == f"generated with {instance.evidence}"
     changed = instance.gait_problem.with_values(**{"lambda": 0.5})
     assert find_reference(identify_problem(changed)).objective is None
-
-
-@pytest.mark.parametrize(
-    "id", ["ssp-v5-time10", "ssp-v5-lift24", "ssp-v5-time20", "dsp-v5", "walk12-w015", "walk12-fast-w015"]
-)
-def test_an_instance_has_its_proof_also_where_it_holds_variables_constant(id: str) -> None:
-    known = of_instance(id)
-    assert known.objective is not None and known.bound is not None and known.source.startswith("shipped, proven to ")
-    assert abs(known.bound - known.objective) / known.objective < 0.0101
-    assert known.proven_as == id
-    instance = gaitbench.load(id)
-    values = build_exact_model(instance.gait_problem).at(known.x, instance.gait_problem.p)
-    assert abs(values.cost) == pytest.approx(known.objective, rel=1e-9)
-    assert values.violation <= FEASIBILITY_TOLERANCE
 
 
 @pytest.mark.parametrize("id", ["ssp-v5-time10", "dsp-v5-time05", "walk12-fast-w015", "walk12-fast-w100"])

@@ -110,14 +110,6 @@ def test_many_hostile_plug_ins_leave_the_others_records_whole(
 
 
 @pytest.mark.slow
-def test_a_study_with_workers_takes_them_too(tmp_path: Path) -> None:
-    bad = f"{written(tmp_path, 'bad', 'ends its process')}:Algorithm"
-    tasks = [Task(problem=WALK, solver=a, label=b, stop=PATIENT) for a, b in ((bad, "bad"), ("pso", ""), ("ga", ""))]
-    records = run_study(Study(tasks=tuple(tasks), jobs=2))
-    assert [record.claimed for record in records] == [False, True, True] and "by status 7" in records[0].status
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "body", "said"),
     [
