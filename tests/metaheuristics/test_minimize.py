@@ -146,3 +146,8 @@ def test_bad_criteria(criterion: dict[str, float]) -> None:
 def test_bad_answers(answer: tuple[Array, Array], message: str) -> None:
     with pytest.raises(SearchError, match=message):
         minimize(Function(lambda X: answer, [0.0], [1.0]), SWARM)
+
+
+def test_time_limit() -> None:
+    result = minimize(disc(), SWARM, stop=EarlyStop(time_limit_s=1e-9))
+    assert result.reasons == ("time limit reached",) and result.generations == 1

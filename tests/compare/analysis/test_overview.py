@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import pytest
-from scipy.stats import friedmanchisquare
 
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import write_overall_headline
@@ -30,6 +29,8 @@ def comparisons() -> list[Comparison]:
 
 
 def test_ranks_and_tests_are_those_computed_by_hand(comparisons: list[Comparison]) -> None:
+    from scipy.stats import friedmanchisquare  # costs a second to import
+
     ranking = rank_over_problems(comparisons)
     assert ranking.mean_ranks == pytest.approx({"ipopt": 1.0, "mine": 7.5 / 3, "pso": 7.5 / 3})
     assert ranking.friedman == pytest.approx(friedmanchisquare(*zip(*MEDIANS.values(), strict=True)).pvalue)

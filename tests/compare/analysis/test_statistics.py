@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import mannwhitneyu
 
 from compare.analysis.best_known import compute_gap
 from compare.analysis.pairs import describe_power
@@ -181,6 +180,8 @@ def test_best_known_is_the_best_that_the_judge_accepts() -> None:
 
 @given(costs, costs)
 def test_the_rank_sum_test_is_that_of_scipy(a: list[float], b: list[float]) -> None:
+    from scipy.stats import mannwhitneyu  # costs a second to import
+
     expected = 1.0 if len({*a, *b}) == 1 else float(mannwhitneyu(a, b, alternative="two-sided").pvalue)
     assert compute_rank_sum(a, b) == pytest.approx(expected, rel=1e-12)
 
