@@ -22,6 +22,7 @@ from nlp_gait.errors import InputError
 
 CSV = "Write all runs and all judged points as CSV files too."
 LATEX = "Also write tables for papers: of each problem, and of all problems and solvers (LaTeX, package booktabs)."
+DIGITS = "Decimals of objectives in these tables (default: as many as different medians need to differ)."
 FIGURES = "Also write all figures as PNG, and for papers as PDF, one column wide, with captions in LaTeX."
 WATCH = "Rewrite the report while the study runs; the open page reloads itself."
 LOGS = "Also write the runs as logs for iohinspector, into the folder logs."
@@ -35,6 +36,7 @@ def report(
     *,
     folder: Annotated[Path, Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
     latex: Annotated[bool, Option("--latex", help=LATEX)] = False,
+    digits: Annotated[int | None, Option(min=0, max=15, help=DIGITS)] = None,
     figures: Annotated[bool, Option("--figures", help=FIGURES)] = False,
     logs: Annotated[bool, Option("--logs", help=LOGS)] = False,
     code: Code = None,
@@ -57,7 +59,7 @@ def report(
         watch_report(folder, lambda: _rewrite(folder))
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = evidence.records
-    further = FurtherFiles(csv=csv, latex=latex, figures=figures)
+    further = FurtherFiles(csv=csv, latex=latex or digits is not None, decimals=digits, figures=figures)
     written = write_report(folder, records, manifest, excluded=evidence.excluded, further=further)
     if logs:
         comparisons = compare_problems(records)

@@ -19,12 +19,12 @@ UNKNOWN = "--"
 LEAST_DECIMALS, MOST_DECIMALS = 4, 10
 
 
-def format_latex_table(comparison: Comparison) -> str:
+def format_latex_table(comparison: Comparison, decimals: int | None = None) -> str:
     """Return the table of one problem: a row for each solver, the best median over all runs first.
 
-    Objectives have as many decimals as different medians need to differ.
+    Objectives have so many decimals, or else as many as different medians need to differ.
     """
-    decimals = _choose_decimals(comparison)
+    decimals = _choose_decimals(comparison) if decimals is None else decimals
     p_values = {pair.second: pair.rank_sum for pair in comparison.pairs if pair.first == comparison.solvers[0].name}
     rows = []
     for solver in comparison.solvers:

@@ -28,6 +28,7 @@ class FurtherFiles:
 
     csv: bool = False  #: all runs, and the points of each problem; written again, too, where they exist already
     latex: bool = False  #: a table of each problem, and one of several problems and all solvers
+    decimals: int | None = None  #: of objectives in these tables; None for as many as medians need to differ
     #: figures of the report as PNG, and those of each problem one column wide as PDF with their captions in LaTeX
     figures: bool = False
 
@@ -47,7 +48,7 @@ class FurtherFiles:
         for comparison in comparisons:
             stem = folder / make_file_name(comparison.problem)
             if self.latex:
-                table = format_latex_table(comparison)
+                table = format_latex_table(comparison, self.decimals)
                 written.append(write_text(stem.with_name(f"{stem.name}-table.tex"), table))
             if self.figures:
                 written += _write_figures(stem, comparison)
