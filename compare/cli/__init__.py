@@ -42,34 +42,19 @@ PANELS = {
         "export": ("export:export", "Write a gait, an instance or a problem for others."),
     },
 }
-# What serves instead of removed names: "command", "command --option", or "--option" of any command.
+# What serves instead of removed commands.
 REPLACEMENTS = {
-    name.strip(): sentence
-    for names, sentence in {
-        "animate": "export --to html plays a gait",
-        "archive, bench --submit": "verify FOLDER --pack FILE.zip packs a study",
-        "bench --verify, bench --rerun, bench --code": "verify FILE.zip checks an archive, with --rerun and --code",
-        "bench --objectives": "pareto PROBLEM --search NSGA2=10000 compares searches with the true front",
-        "capabilities, sweep --capabilities": "sweep --over speed_m_s=LOW:HIGH:COUNT names what stops the robot",
-        "certainty --evaluations": "compare PROBLEM --algorithms cma --starts 0 --runs 1 --evaluations N runs a long search",
-        "cite": "list --cite [NAME] prints BibTeX",
-        "export-objective, export-solver, export --format": "export --to KIND names the kind of the file",
-        "list --algorithms": "list algorithms shows the settings of all",
-        "logs": "report FOLDER --logs writes the runs as logs for iohinspector",
-        "motions, motors": "variants compares motors, motions and options",
-        "search": "compare PROBLEM --algorithms pso --starts 0 --runs 1 runs a search",
-        "walk": "sweep --engine simulates the cheapest cycle at each speed",
-        "pareto --objectives": "pareto --against NAME trades power against one mean margin or the speed",
-        "simulate --feed-forward, simulate --feedback-delay-ms, simulate --feedback-noise, simulate --feedback-seed, "
-        "simulate --interpolation, simulate --period-ms": "its value belongs into the file of --drive FILE.toml",
-        "simulate --push-at-s": "simulate --push X,Y,S has the time of the push",
-        "--derivatives, --intervals, --option, --fix": "--set NAME=VALUE sets options and fixes variables",
-        "compare --csv, import --csv": "report DIR --csv writes CSV files of a study",
-        "compare --engine, report --engine": "simulate RECORD.json simulates the gait of a run",
-        "compare --penalty-weight": "give --handling penalty=WEIGHT",
-        "compare --stagnation, compare --target": "a study file has it, see --config",
-    }.items()
-    for name in names.split(",")
+    "animate": "export --to html plays a gait",
+    "archive": "verify FOLDER --pack FILE.zip packs a study",
+    "capabilities": "sweep --over speed_m_s=LOW:HIGH:COUNT names what stops the robot",
+    "cite": "list --cite [NAME] prints BibTeX",
+    "export-objective": "export --to objective writes it",
+    "export-solver": "export --to solver writes it",
+    "logs": "report FOLDER --logs writes the runs as logs for iohinspector",
+    "motions": "variants compares motions",
+    "motors": "variants compares motors",
+    "search": "compare PROBLEM --algorithms pso --starts 0 --runs 1 runs a search",
+    "walk": "sweep --engine simulates the cheapest cycle at each speed",
 }
 
 
@@ -96,10 +81,6 @@ class ImportedWhenUsed(TyperCommand):
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """Parse the arguments by the command's own parser."""
-        known = {flag for parameter in self.params for flag in (*parameter.opts, *parameter.secondary_opts)}
-        for flag in (arg.split("=")[0] for arg in args if arg.startswith("--")):
-            if flag not in known:
-                _refuse_removed(f"{self.name} {flag}", flag)
         return load_command(str(self.name)).make_context(info_name, args, parent, **extra)
 
 
@@ -108,17 +89,11 @@ class Commands(TyperGroup):
 
     def resolve_command(self, context: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
         """Return name, command and arguments."""
-        _refuse_removed(args[0])
-        return super().resolve_command(context, args)
-
-
-def _refuse_removed(*names: str) -> None:
-    """End with one sentence that says what serves instead of a removed command or option."""
-    for name in names:
-        if name in REPLACEMENTS:
+        if args[0] in REPLACEMENTS:
             from compare.cli.printing import fail
 
-            fail(f"{name.split()[-1]} was removed: {REPLACEMENTS[name]}", status=2)
+            fail(f"{args[0]} was removed: {REPLACEMENTS[args[0]]}", status=2)
+        return super().resolve_command(context, args)
 
 
 app = typer.Typer(
