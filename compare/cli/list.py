@@ -38,7 +38,7 @@ def list_problems(
     name: Annotated[str | None, Argument(metavar="[NAME]", help=NAME)] = None,
     robot: Annotated[str | None, Option(metavar="FILE", help=ROBOT)] = None,
     out: Annotated[
-        Path | None, Option(help="With --robot: figure of the robot and its soles, as PNG and SVG."), OUTPUT_FILE
+        Path | None, Option(help="With --robot: figure of the robot and its soles, as PNG."), OUTPUT_FILE
     ] = None,
     cite: Annotated[bool, Option("--cite", help=CITE)] = False,
 ) -> Output:
@@ -97,7 +97,7 @@ def _describe_robot(name: str, target: Path | None) -> Output:
     if target is not None:
         from compare.drawing.robot_figures import plot_robot
 
-        written = plot_robot(body.biped, target.with_suffix(""))
+        written = (plot_robot(body.biped, target.with_suffix(".png")),)
     table = Rows(f"Robot {title} as read", ("item", "value"), facts)
     return Output(
         data={"robot": title, **dict(facts), "notes": list(notes)},

@@ -175,7 +175,7 @@ def simulate(
         write_json(folder / "report.json", replace_nan(data))
         write_text(folder / "model.xml", make_plan_model(plan, drive, sole, conditions.friction, conditions.bumps))
         write_npz(folder / "simulation.npz", trace.signals(plan.joints))
-        written += plot_simulation(plan, trace, drive, folder / "simulation")
+        written.append(plot_simulation(plan, trace, drive, folder / "simulation.png"))
     parts = [
         *_describe(report),
         *(() if walk is None else [_describe_course(walk, drive.feedback is None and drive.balance is None)]),

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from compare.drawing import STYLE
-from nlp_gait.files import replace_file, write_text
+from nlp_gait.files import replace_file
 from nlp_gait.interrupts import delay_interrupts
 
 if TYPE_CHECKING:
@@ -119,16 +119,6 @@ def format_power_of_ten(value: float) -> str:
     return "10" + str(exponent).translate(
         str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
     )
-
-
-def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
-    """Write ``<stem>.png`` and ``<stem>.svg`` and return both paths; raises OutputError."""
-    import matplotlib
-
-    svg = write_text(stem.with_name(f"{stem.name}.svg"), render_svg(figure))
-    with matplotlib.rc_context({"figure.constrained_layout.use": False}):
-        figure.set_layout_engine(None)  # the layout is final; with any engine Matplotlib draws twice
-    return save_figure(figure, stem.with_name(f"{stem.name}.png")), svg
 
 
 def save_figure(figure: Figure, path: Path) -> Path:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compare.drawing.figures import make_figure, save, use_style
+from compare.drawing.figures import make_figure, save_figure, use_style
 from nlp_gait.robots.biped import Biped
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import average_pressure
@@ -17,8 +17,8 @@ EVERY = 4  # steps of the engine; more points than a page can show make the file
 ENGINE, MODEL = "#56B4E9", "#000000"
 
 
-def plot_robot(biped: Biped, stem: Path) -> tuple[Path, Path]:
-    """Write ``<stem>.png`` and ``<stem>.svg`` and return both paths; raises OutputError."""
+def plot_robot(biped: Biped, path: Path) -> Path:
+    """Write a figure as PNG or PDF and return its path; raises OutputError."""
     robot = biped.full
     with use_style():
         canvas = make_figure(9.0, 4.4)
@@ -51,11 +51,11 @@ def plot_robot(biped: Biped, stem: Path) -> tuple[Path, Path]:
         front.set_title("from behind")
         aside.set_title("from the right")
         canvas.suptitle(robot.name)
-        return save(canvas, stem)
+        return save_figure(canvas, path)
 
 
-def plot_simulation(plan: Plan, trace: Simulation, drive: Drive, stem: Path) -> tuple[Path, Path]:
-    """Write ``<stem>.png`` and ``.svg``; raises OutputError."""
+def plot_simulation(plan: Plan, trace: Simulation, drive: Drive, path: Path) -> Path:
+    """Write a figure as PNG or PDF and return its path; raises OutputError."""
     planned, shown = plan.signals.arrays, slice(None, None, EVERY)
     t = trace.t[shown]
     with use_style():
@@ -80,4 +80,4 @@ def plot_simulation(plan: Plan, trace: Simulation, drive: Drive, stem: Path) -> 
         axes[3].legend(loc="best", ncols=2)
         for axis in axes:
             axis.axvline(plan.duration_s, color="#a0a0a0", lw=0.8)
-    return save(figure, stem)
+    return save_figure(figure, path)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from compare.drawing.figures import save
+from compare.drawing.figures import save_figure
 from nlp_gait import files
 from nlp_gait.errors import OutputError
 from nlp_gait.export.formats import write_npz
@@ -26,7 +26,7 @@ WRITERS: dict[str, Callable[[Path], object]] = {
     ".txt": lambda path: write_text(path, "new"),
     ".npz": lambda path: write_npz(path, SIGNALS),
     ".gif": lambda path: write_video(path, [np.zeros((8, 8, 3), dtype=np.uint8)] * 2, 10.0),
-    ".png": lambda path: save(Figure(figsize=(1, 1)), path.with_suffix("")),
+    ".png": lambda path: save_figure(Figure(figsize=(1, 1)), path),
 }
 
 

@@ -27,7 +27,7 @@ def test_simulate_reports_and_writes_its_folder(gait, tmp_path):
     assert report["fallen"] is False and report["measured"]["mechanical_W"] > 0.0
     assert {**json.loads((out / "report.json").read_text()), "files": report["files"]} == report
     written = sorted(p.name for p in out.iterdir())
-    assert written == ["model.xml", "report.json", "simulation.npz", "simulation.png", "simulation.svg"]
+    assert written == ["model.xml", "report.json", "simulation.npz", "simulation.png"]
     with np.load(out / "simulation.npz") as arrays:
         assert arrays["q"].shape == (len(arrays["t"]), 22) == arrays["set_points"].shape
 
