@@ -41,8 +41,7 @@ def test_every_command_takes_them(mine: Path) -> None:
     found = as_json(*search.split())
     assert found["runs"][0]["evaluations"] == 300 and found["runs"][0]["verdict"]["feasible"]
     assert "swing_rad" in nlp_gait("list", "my.py:two_link").stdout
-    swept = ["sweep", "my.py:two_link", "--over", "speed_m_s=0.5,0.6", "--out", "sweep", "--evaluations", "200"]
-    assert "speed_m_s" in nlp_gait(*swept, "--algorithm", "my.py:Shrinking").stdout
+    swept = ["sweep", "my.py:two_link", "--over", "speed_m_s=0.5,0.6", "--out", "sweep"]
     assert "speed_m_s" in nlp_gait(*swept, "--starts", "1").stdout
     assert "my.py" in one_sentence("solve", "my.py:three_link")
 
