@@ -45,8 +45,9 @@ class Balance:
     gap: float = 0.1  # between soles that pass each other [widths of the sole]
     load_rate: float = 6.0  # of a foot's load after touch-down and before lift-off [weight w]
     touch: float = 0.05  # load of a foot that has landed
-    stiffness: float = 0.3  # of the drives, relative to the open loop's
-    hold: float = 1.0  # 1: drives hold planned angles and rates besides the torques of balance; 0: the present ones
+    # Share of the planned angles that drives hold besides the torques of balance, for each m g h of the ankles' stiffness: a
+    # stiff robot tips as a block; a compliant one would be turned over by its planned angles where a sole lies tilted
+    hold: float = 1 / 60
 
     def __post_init__(self) -> None:
         for setting in fields(self):
@@ -257,6 +258,9 @@ class WholeBodyBalance:
         self._addresses = Addresses(self._model, plan)
         self._reference = WalkReference(plan, self._model, torque_limits)
         self._qp = WholeBodyQP(self._reference, self._model, self._addresses, torque_limits, settings.friction)
+        ankles = [plan.joints.index(plan.robot.path_to_root(foot.link)[0].name) for foot in plan.robot.feet.values()]
+        stiffest = float(self._stiffness[ankles].max())
+        self._hold = min(1.0, settings.hold * stiffest / (self._reference.mass * plan.gravity * self._reference.height))
         self._sensor = StateSensor(settings, plan, self._model)
         self.clock = StepClock(settings, self._reference)
         self._command: Array | None = None
@@ -297,7 +301,7 @@ class WholeBodyBalance:
             return q.copy() if self._command is None else self._command
         soon = qd + solution.accelerations * s.period_s
         planned, rate = (self._reference.sample(name, self.clock.time_s) for name in ("q", "qd"))
-        held, held_rate = q + s.hold * (planned - q), soon + s.hold * (self.clock.rate * rate - soon)
+        held, held_rate = q + self._hold * (planned - q), soon + self._hold * (self.clock.rate * rate - soon)
         return np.asarray(held + (solution.torques + self._damping * held_rate) / self._stiffness)
 
     def _collect_targets(self, data: Any, feet: Array, weight: float) -> Targets:

@@ -81,8 +81,7 @@ class Drive:
         """Return the stiffness of a joint's drive [Nm/rad]."""
         if self.controller is not None:
             return self.controller.kp
-        share = 1.0 if self.balance is None else self.balance.stiffness
-        return share * find_stall_torque(joint) / self.full_error_rad
+        return find_stall_torque(joint) / self.full_error_rad
 
     def damping(self, joint: Joint) -> float:
         """Return the damping of a joint's drive [Nm s/rad]."""
