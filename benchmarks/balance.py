@@ -31,7 +31,7 @@ INSTANTS = 12  # of pushes, even over the inner steps
 LEVELS, LARGEST = 16, 0.5  # of the bisection, and its largest impulse [m sqrt(g h)]
 PUSH_S = 0.1
 SETTLE = 10.0  # [1 / w] after a push, within which a robot that has lost its balance falls
-SEEDS = range(4)
+SEEDS = range(8)
 WORLDS = {  # by name: conditions by seed, and whether sensors have noise and a delay of 4 ms
     "bumps of 5 mm": (lambda seed: Conditions(bumps=Bumps(height_m=0.005, seed=seed)), False),
     "mass +5 %": (lambda seed: Conditions(mass_factor=1.05), False),

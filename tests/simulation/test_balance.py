@@ -110,8 +110,11 @@ def advance(run: Run) -> Array:
 
 
 @pytest.mark.slow
-def test_a_disturbed_walk_stands_with_it_and_falls_without(plan: Plan) -> None:
-    conditions = Conditions(push=Push(impulse_Ns=(0.0, 2.5), start_s=0.35 * plan.duration_s, duration_s=0.1))
+@pytest.mark.parametrize(("impulse_Ns", "share"), [((2.1, 0.0), 0.45), ((0.0, 2.1), 0.55), ((0.0, -1.8), 0.55)])
+def test_a_pushed_walk_stands_with_it_and_falls_without(
+    plan: Plan, impulse_Ns: tuple[float, float], share: float
+) -> None:
+    conditions = Conditions(push=Push(impulse_Ns=impulse_Ns, start_s=share * plan.duration_s, duration_s=0.1))
     alone, balanced = (Run(plan, conditions, drive).finish() for drive in (Drive(), Drive(balance=Balance())))
     assert alone.fell_at_s is not None and balanced.fell_at_s is None
 
