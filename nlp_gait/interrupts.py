@@ -70,8 +70,8 @@ def delay_interrupts() -> Iterator[None]:
         return
     with defer_interrupts() as pressed:
         yield
-        if pressed():
-            raise KeyboardInterrupt
+    if pressed():  # not before: it may be pressed until the handler is restored
+        raise KeyboardInterrupt
 
 
 @contextmanager

@@ -5,7 +5,13 @@ import signal
 
 import pytest
 
-from nlp_gait.interrupts import defer_interrupts, exit_on_interrupt, raise_interrupts, remember_interrupts
+from nlp_gait.interrupts import (
+    defer_interrupts,
+    delay_interrupts,
+    exit_on_interrupt,
+    raise_interrupts,
+    remember_interrupts,
+)
 
 
 def test_a_second_press_is_not_deferred() -> None:
@@ -13,6 +19,17 @@ def test_a_second_press_is_not_deferred() -> None:
         signal.raise_signal(signal.SIGINT)
         assert pressed()
         signal.raise_signal(signal.SIGINT)
+
+
+def test_a_press_while_the_handler_is_restored_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    restore = signal.signal
+
+    def press(number: int, handler: object) -> object:
+        signal.raise_signal(signal.SIGINT)
+        return restore(number, handler)  # type: ignore[arg-type]
+
+    with pytest.raises(KeyboardInterrupt), delay_interrupts():
+        monkeypatch.setattr(signal, "signal", press)
 
 
 def test_an_ignored_interrupt_stays_ignored() -> None:
