@@ -272,10 +272,9 @@ class Paper(Generic[E, R]):
             run = effort.runs or row.id not in self.book.on_runs
             effect = row.effect or (self.book.functions[row.id](results) if run else str(Ruling.NOT_RUN))
             if not isinstance(effect, str):
-                words = {
-                    n: value if isinstance(value, str) else f"{round(value, 6):.4g}" for n, value in effect.items()
-                }
-                effect = "; ".join(f"{name}: {value}" for name, value in words.items())
+                effect = "; ".join(
+                    f"{n}: {v if isinstance(v, str) else f'{round(v, 6):z.4g}'}" for n, v in effect.items()
+                )
             shown = {"where": row.where, "printed": row.printed, "here": row.here, "option": row.option}
             rows.append({**shown, "effect": effect})
         return tabulate("differences", "", rows, prose=True)

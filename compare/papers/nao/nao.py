@@ -244,10 +244,10 @@ def measure_choice(results: Mapping[str, NaoResults], id: str) -> dict[str, floa
         for search in SEARCHES:
             figures = evaluate_point(make_spec(phase, "physical", **options), PRINTED_X[phase, search])
             errors += [1000 * abs(figures[index] - PRINTED[phase, search][index]) for index in indexes]
-        effects[f"largest error of {words}, with this alone [mm]"] = max(errors)
-        effects["without [mm]"], effects["with all [mm]"] = (
-            max(map(abs, list_errors(results[reading], phase, indexes))) for reading in ("physical", "printed")
-        )
+        effects[f"largest error of {words}, with this choice alone [mm]"] = max(errors)
+        for reading, what in (("physical", "none"), ("printed", "all")):
+            errors = list_errors(results[reading], phase, indexes)
+            effects[f"largest error of {words}, with {what} of the printed reading [mm]"] = max(map(abs, errors))
     return effects
 
 

@@ -102,7 +102,7 @@ def compute_saving(results: StairsResults, key: str) -> float:
 
 
 def compare_choice(results: Mapping[str, StairsResults], name: str) -> dict[str, float | str]:
-    """Return the plans of case 2 with a choice of the planner undone, next to ours."""
+    """Return the optima of case 2 with a choice of the planner undone, next to ours."""
     effects: dict[str, float | str] = {}
     for reading, plan in PLANS.items():
         result, (index, unit) = results[reading], INDEXES[plan]
@@ -110,7 +110,8 @@ def compare_choice(results: Mapping[str, StairsResults], name: str) -> dict[str,
         value = (
             run.verdict.indexes[index] if run.verdict.feasible else f"no plan ({', '.join(run.verdict.violated[:1])})"
         )
-        effects |= {f"case {DRAWN_CASE}, {reading} [{unit}]": value, "ours": ours}
+        label = f"case {DRAWN_CASE}, {reading}"
+        effects |= {f"{label} [{unit}]": value, f"{label}, ours [{unit}]": ours}
     return effects
 
 
@@ -122,7 +123,8 @@ def compare_hip_height(results: Mapping[str, StairsResults]) -> dict[str, float 
         effects[f"starts that are feasible at their samples, of {len(runs)}, case {case}"] = sum(
             run.verdict.feasible for run in runs
         )
-        effects["violated between them"] = [*choose_best(runs).verdict.violated, "nothing"][0]
+        worst = [*choose_best(runs).verdict.violated, "nothing"][0]
+        effects[f"violated between samples, case {case}"] = worst
     return effects
 
 
