@@ -16,7 +16,7 @@ from docs.difficulty import Best, Difficulty, Reached, difficulties
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem, list_problems, load
-from nlp_gait.formulation.registry import find_maker
+from nlp_gait.formulation.registry import find_maker, find_option_groups
 from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaitbench.facts import DEFINITIONS, load_facts
 from nlp_gait.proofs.certificate import load_certificates
@@ -27,7 +27,6 @@ GAITS = "gaits"  # folder at the root of the site, see ``front``
 LEFT_OUT = ("gaitbench",)  # a suite, with a page of its own
 SHOWN = 12  # variables, and binding rows, on a page
 SAME = 1e-6  # relative; another processor rounds otherwise
-OPTION = re.compile(r"^ {4}(\w+) {2,}(.+(?:\n {8,}.+)*)", re.MULTILINE)
 ARGUMENT = re.compile(r"^ {4}(\w+): (.+(?:\n {8,}.+)*)", re.MULTILINE)
 SOURCE = re.compile(r"^Source:\n((?: {4}.+\n?)+)", re.MULTILINE)
 INTRODUCTION = """# Problems
@@ -314,11 +313,11 @@ def list_options(problems: Sequence[GaitProblem]) -> str:
 
 
 def _option_words(problem: GaitProblem) -> Iterator[tuple[str, str]]:
-    """Return the meaning of options, from the docstrings of the family and of the maker."""
-    module = PROBLEMS[problem.name].partition(":")[0]
-    family = importlib.import_module(".".join(module.split(".")[:3])).__doc__ or ""
-    for pattern, text in ((OPTION, family), (ARGUMENT, inspect.getdoc(find_maker(problem.name)) or "")):
-        for name, words in pattern.findall(text):
+    """Return the meaning of options, from the docstrings of the maker and of the classes that declare them."""
+    make = find_maker(problem.name)
+    groups = find_option_groups(make).values()
+    for declared in (make, *(kind for group in groups for kind in reversed(inspect.getmro(group)))):
+        for name, words in ARGUMENT.findall(inspect.cleandoc(declared.__doc__ or "")):
             yield name, " ".join(words.split()).rstrip(".")
 
 

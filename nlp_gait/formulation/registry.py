@@ -36,8 +36,7 @@ def maker(make: Maker) -> Maker:
     The function's signature is the only list of the options; an argument annotated with a data class stands for its fields. An
     option annotated with a ``Literal`` takes its values only. The problem is refined by the option that its grid names.
     """
-    hints: dict[str, Any] = get_type_hints(make)
-    groups = {name: hint for name, hint in hints.items() if hasattr(hint, "__dataclass_fields__") and name != "return"}
+    groups = find_option_groups(make)
     listed = [inspect.signature(kind).parameters for kind in groups.values()] or [inspect.signature(make).parameters]
     parameters = {name: option for options in listed for name, option in options.items()}
 
@@ -66,6 +65,12 @@ def maker(make: Maker) -> Maker:
     make_problem.__annotations__ = {k: v for kind in groups.values() or [make] for k, v in get_type_hints(kind).items()}
     make_problem.checks_options = True  # type: ignore[attr-defined]
     return make_problem
+
+
+def find_option_groups(make: Maker) -> dict[str, Any]:
+    """Return the data classes whose fields are a maker's options, by argument; none if its arguments are the options."""
+    hints: dict[str, Any] = get_type_hints(inspect.unwrap(make))
+    return {name: hint for name, hint in hints.items() if hasattr(hint, "__dataclass_fields__") and name != "return"}
 
 
 def list_problems() -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from nlp_gait.formulation import Array, GaitProblem, Grid, Signals, load
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.cycle import make_walking_cycle
 from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.impact import Impact
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.humanoid.body import make_humanoid
 from nlp_gait.gaits.nao.body import make_nao
@@ -51,7 +52,8 @@ def measure(robot: Robot, signals: Signals, sample: int) -> tuple[float, Array]:
 def list_phases(problem: GaitProblem, body: Body, x: Array) -> list[Signals]:
     """Return both phases, each with its sample at the switch."""
     loads = make_divided_loads(body, "lever")
-    cycle = make_walking_cycle(body, loads, Grid(intervals=10), Goal(), at_given_speed=False, landing="inelastic")
+    impact = Impact(name="touch_down")
+    cycle = make_walking_cycle(body, loads, Grid(intervals=10), Goal(), at_given_speed=False, touch_down=impact)
     return [phase.signals(problem.at(x)) for phase in cycle.phases.values()]
 
 

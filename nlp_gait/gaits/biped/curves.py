@@ -12,14 +12,13 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.formulation import Array, Grid, InstantPoint, Start, Variable
-from nlp_gait.formulation.assembly import Quadrature, make_variables
+from nlp_gait.formulation import Array, InstantPoint, Start, Variable
+from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.symbolic.trajectories import Motion, add_motions, count_coefficients, cubic, spline, stack
 
 Trajectory = Literal["cubic", "quintic", "spline-2", "spline-4", "spline-8", "spline-16"]
 SPANS: dict[str, int] = dict(zip(get_args(Trajectory), (0, 1, 2, 4, 8, 16), strict=True))
 
-SAMPLES, SPLINE_SAMPLES = 1, 4  # default samples in each interval: a cubic cannot bend between 11 samples, a spline can
 # Coefficients of a spline lie within these bounds, wider than any optimum's, and start within a share of them.
 BOUNDS = {"m": 0.3, "rad": 3.0}
 START_SHARE = 0.05
@@ -100,21 +99,3 @@ def move_hip(
         for axis, (start, end) in ends.items()
     )
     return add_motions(stack(*paper), stack(*(curves[curve] for curve in HIP_CURVES)))
-
-
-def make_grid(
-    trajectory: str,
-    intervals: int,
-    samples_per_interval: int,
-    *,
-    rule: Quadrature = "trapezoid",
-) -> Grid:
-    """Return the samples of a phase; 0 in an interval stands for as many as suit the trajectory."""
-    if samples_per_interval == 0 and not isinstance(samples_per_interval, bool):
-        samples_per_interval = SPLINE_SAMPLES if trajectory != "cubic" else SAMPLES
-    return Grid(
-        intervals=intervals,
-        samples_per_interval=samples_per_interval,
-        refined_by="samples_per_interval",
-        rule=rule,
-    )

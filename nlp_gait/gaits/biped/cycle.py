@@ -15,21 +15,14 @@ from nlp_gait.formulation.assembly import Objective, Parameter, Point, Variable,
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import TIMES, Body, Support
 from nlp_gait.gaits.biped.bounds import make_usual_bounds
-from nlp_gait.gaits.biped.cycle_motion import (
-    AFTER,
-    LANDING,
-    LEAST_STEP,
-    STEP,
-    make_cycle_planners,
-    make_cycle_variables,
-)
+from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, make_cycle_planners, make_cycle_variables
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.impact import Impact
 from nlp_gait.gaits.biped.limits import BalanceMargins, Box, compute_margins, make_rows
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase, make_start_within_reach
 from nlp_gait.gaits.biped.samples import Loader
-from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, TORQUE_JUMP, MotionSection, Sequence, Switch
+from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, MotionSection, Sequence
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
+from nlp_gait.gaits.biped.switch import SOFT_LANDING, TORQUE_JUMP, Switch
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 SPEED = "speed_m_s"
@@ -40,15 +33,12 @@ LEAST_SPEED = 1e-4  # [m/s]
 NO_JUMP_LIMIT = 1000.0  # of NAO [Nm]
 
 
-Landing = Literal["soft", "inelastic"]  # of the swinging foot: at rest, or an impact
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WalkingCycle(Sequence):
     """A cycle sampled over both phases; of the variables, the step length is the last one."""
 
     sections: tuple[MotionSection, ...] = CYCLE
-    touch_down: Switch = Switch(name="touch_down")
+    touch_down: Switch = SOFT_LANDING
     at_given_speed: bool  # the step length is no decision variable but follows from the speed
 
     @property
@@ -130,18 +120,16 @@ class WalkingCycle(Sequence):
 
 
 def make_walking_cycle(
-    body: Body, loads: Loader, grid: Grid, goal: Goal, *, at_given_speed: bool, landing: Landing = "soft"
+    body: Body, loads: Loader, grid: Grid, goal: Goal, *, at_given_speed: bool, touch_down: Switch = SOFT_LANDING
 ) -> WalkingCycle:
     """Return both phases of the cycle, joined, each with the goal; at a given speed the step length follows from it."""
-    inelastic = landing == "inelastic"
-    variables = make_cycle_variables(body, inelastic)
-    plans, margins = make_cycle_planners(body, inelastic), make_cycle_margins(body)
+    variables = make_cycle_variables(body, touch_down)
+    plans, margins = make_cycle_planners(body, touch_down), make_cycle_margins(body)
     fields: dict[str, Any] = {"variables": variables, "grid": grid, "goal": goal}
     phases = {
         kind: make_phase(body, kind, margins[kind], loads, duration=TIMES[kind], plan=plan, **fields)
         for kind, plan in plans.items()
     }
-    touch_down = Impact(name="touch_down") if inelastic else Switch(name="touch_down")
     return WalkingCycle(
         body=body, variables=variables, phases=phases, at_given_speed=at_given_speed, touch_down=touch_down
     )
@@ -163,12 +151,12 @@ def make_cycle_margins(body: Body) -> dict[Support, BalanceMargins]:
 
 
 def plan_cycle(
-    body: Body, grid: Grid, objective: CycleObjective, loads: Loader, landing: Landing = "soft"
+    body: Body, grid: Grid, objective: CycleObjective, loads: Loader, touch_down: Switch = SOFT_LANDING
 ) -> GaitProblem:
-    """Return the problem of a walking cycle; for the options see ``gaits.nao``."""
+    """Return the problem of a walking cycle; for the objective and the touch-down see ``CycleOptions``."""
     at_given_speed = objective != "energy-per-metre"
     goal = make_goal(body, "torque" if objective == "torque" else "power")
-    cycle = make_walking_cycle(body, loads, grid, goal, at_given_speed=at_given_speed, landing=landing)
+    cycle = make_walking_cycle(body, loads, grid, goal, at_given_speed=at_given_speed, touch_down=touch_down)
     names = tuple(variable.name for variable in cycle.decisions)
 
     def reach(point: Point) -> MX:
@@ -176,8 +164,7 @@ def plan_cycle(
             *(cycle.phases[p.kind].sample(cycle.read_section(p, point), Exact()).reach for p in cycle.sections)
         )
 
-    drawn = at_given_speed or landing == "inelastic"
-    start: Start | None = partial(draw_start, names) if drawn else None
+    start: Start = partial(draw_start, names, touch_down)
     if not body.closed_form:
         usual = [make_usual_bounds(body, variable) for variable in cycle.decisions]
         start = make_start_within_reach(usual, (SPEED,) if at_given_speed else (), reach, start)
@@ -204,8 +191,10 @@ def make_cycle_problem(
     return add_robot(problem, cycle.body, repeats=repeats)
 
 
-def draw_start(names: tuple[str, ...], values: Mapping[str, float], rng: np.random.Generator) -> Array:
-    """Draw a start point within the bounds, with a soft landing.
+def draw_start(
+    names: tuple[str, ...], touch_down: Switch, values: Mapping[str, float], rng: np.random.Generator
+) -> Array:
+    """Draw a start point within the bounds.
 
     At a given speed its times give a step within its bounds, as far as their own bounds allow.
     """
@@ -214,9 +203,5 @@ def draw_start(names: tuple[str, ...], values: Mapping[str, float], rng: np.rand
         times = [names.index(time) for time in TIMES.values()]
         step = rng.uniform(values[f"{STEP}.lower"], values[f"{STEP}.upper"])
         x[times] *= step / (values[SPEED] * x[times].sum())
-    for k, name in enumerate(names):
-        if name == LANDING:
-            x[k] = values[f"{LANDING}.lower"]
-        elif AFTER in name:  # nothing jumps
-            x[k] = x[names.index(name.replace(AFTER, "touch_down"))]
-    return np.asarray(x)
+    start = dict(zip(names, x.tolist(), strict=True))
+    return np.array([*touch_down.change_start(start, values).values()])

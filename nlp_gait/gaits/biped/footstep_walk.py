@@ -16,7 +16,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, NumericPoint, Parameter, Point
 from nlp_gait.formulation.assembly import Variable, make_parameters
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body, Support
-from nlp_gait.gaits.biped.cycle_motion import SWITCHES, interpolate_states, make_cycle_variables, read_state
+from nlp_gait.gaits.biped.cycle_motion import interpolate_states, make_cycle_variables
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides, list_feet, list_swings
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, RowsAndIndexes
 from nlp_gait.gaits.biped.loads import make_divided_loads
@@ -24,6 +24,7 @@ from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Instant, Planner
 from nlp_gait.gaits.biped.sequence import End, MotionSection
 from nlp_gait.gaits.biped.support_phases import compute_sole_margins, limit_to_sole
+from nlp_gait.gaits.biped.switch import SWITCHES, read_state
 from nlp_gait.gaits.biped.walk import NO_LIMIT, WholeWalk, make_speed_row, make_walk_phases, make_walk_problem
 from nlp_gait.gaits.biped.walk_sections import DURATION, SHIFT, STAND, State, make_phase_variables, make_pose_variables
 from nlp_gait.symbolic.nonsmooth import Nonsmooth

@@ -14,16 +14,18 @@ from dataclasses import dataclass, replace
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.formulation import Constraint, Point
+from nlp_gait.formulation import Constraint, InstantPoint, Point, Variable
 from nlp_gait.gaits.biped.body import Body, Support
-from nlp_gait.gaits.biped.cycle_motion import AFTER, make_landing_rates
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Samples
-from nlp_gait.gaits.biped.sequence import Switch
+from nlp_gait.gaits.biped.switch import Switch, SwitchState, make_state_variables, read_rates
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+LANDING, LANDING_M_S = "foot_vx_touch_down_m_s", 0.5  # variable; its greatest value, of NAO
+AFTER = "after_touch_down"  # in names of the variables of the velocities after it
 
 
 class ReadRates(Limit):
@@ -37,7 +39,27 @@ class ReadRates(Limit):
 
 @dataclass(frozen=True, kw_only=True)
 class Impact(Switch):
-    """A touch-down at which the landing foot stops at once, and all joints go on with other rates."""
+    """A touch-down at which the landing foot stops at once, and all joints go on with other rates, which are variables."""
+
+    def make_variables(self, body: Body) -> list[Variable]:
+        """Return the velocities right after it, of the hip and of every coordinate, and that of the landing foot before it."""
+        fastest, words = body.scale_time(LANDING_M_S * body.swing_speed), "forward velocity of the landing foot"
+        speed = Variable(name=LANDING, unit="m/s", lower=0.0, upper=fastest, description=words)
+        return [*make_rates(body), speed]
+
+    def read_landing_speed(self, point: InstantPoint) -> SX:
+        """Return the forward velocity at which the swinging foot lands [m/s]."""
+        return point[LANDING]
+
+    def change_state(self, body: Body, point: InstantPoint, before: SwitchState) -> SwitchState:
+        """Return the state after it: positions are those before it."""
+        velocity, rates = read_rates(point, AFTER, body.coordinates)
+        return before._replace(hip_velocity=velocity, angle_rates=rates)
+
+    def change_start(self, start: Mapping[str, float], parameters: Mapping[str, float]) -> Mapping[str, float]:
+        """Return a start point with the softest landing, at which no velocity jumps."""
+        continuous = {name: start[name.replace(AFTER, "touch_down")] for name in start if AFTER in name}
+        return {**start, **continuous, LANDING: parameters[f"{LANDING}.lower"]}
 
     def join(
         self, phases: Mapping[Support, Phase], point: Point, before: Samples, after: Samples, ops: Nonsmooth
@@ -47,7 +69,7 @@ class Impact(Switch):
         single, double = (replace(phases[kind], limits=(ReadRates(),)) for kind in (Support.SINGLE, Support.DOUBLE))
         body = single.body
         landing = single.sample(point, ops, MX(1.0)).read("all_qd")[:, 0]
-        variables = make_landing_rates(body)
+        variables = make_rates(body)
         names = [variable.name for variable in variables]
         # The rates of joints are linear in the planned velocities: one instant for each unit velocity.
         units = [point.with_values({name: MX(float(name == unit)) for name in names}) for unit in names]
@@ -64,6 +86,11 @@ class Impact(Switch):
             f"{self.name}_impulse_Ns": ca.norm_2(force),
             f"{self.name}_rate_jump_rad_s": ca.norm_inf(jump),
         }
+
+
+def make_rates(body: Body) -> list[Variable]:
+    """Return the variables of the velocities right after it, of the hip and of every coordinate."""
+    return [v for v in make_state_variables(body, AFTER, "touch_down") if v.unit in ("m/s", "rad/s")]
 
 
 def make_impulses(body: Body) -> ca.Function:

@@ -1,42 +1,112 @@
-"""Options of the problems of bipeds, and how NAO's and other humanoids' problems are made of them."""
+"""Options of the problems of bipeds, each declared and explained once, and how the phases' problems are made of them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from nlp_gait.formulation import GaitProblem, Grid
+from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.assembly import Quadrature
 from nlp_gait.gaits.biped.body import Body, Support
-from nlp_gait.gaits.biped.curves import Trajectory, make_grid
+from nlp_gait.gaits.biped.curves import Trajectory
 from nlp_gait.gaits.biped.loads import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal, make_phase_problem
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 
+SPLINE_SAMPLES = 4  # default samples in each interval of a spline, which can bend between 11 samples; a cubic cannot
+
 
 @dataclass(frozen=True, kw_only=True)
-class SampleOptions:
-    """SampleOptions of a phase, and the rule of means."""
+class RobotOptions:
+    """The robot and limits that are added to those of its gait.
+
+    Attributes:
+        robot: name of the robot, or its file: URDF, MJCF or JSON
+        limits: more limits of every phase, separated by commas: FrictionCone, FootClearance, or your own, FILE.py:NAME; see
+            ``nlp_gait.limits``
+    """
+
+    robot: str = "nao-v5"
+    limits: str | AddedLimits = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotorOptions(RobotOptions):
+    """The robot, perhaps with its real motors.
+
+    Attributes:
+        motors: features of the real motors, separated by commas, see ``gaits.biped.motors``, if the robot's file has their data;
+            none by default
+    """
+
+    motors: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GridOptions:
+    """Samples of a phase.
+
+    Attributes:
+        intervals: equal parts of a phase over which torques may change by the limit
+        samples_per_interval: above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with
+            cubics, 4 with splines, which would otherwise bend between the samples
+    """
 
     intervals: int = 10
     samples_per_interval: int = 0
-    rule: Quadrature = "trapezoid"
 
     def make_grid(self, trajectory: Trajectory = "cubic") -> Grid:
         """Return the samples, which suit the trajectory."""
-        return make_grid(trajectory, self.intervals, self.samples_per_interval, rule=self.rule)
+        samples = self.samples_per_interval or (1 if trajectory == "cubic" else SPLINE_SAMPLES)
+        return Grid(intervals=self.intervals, samples_per_interval=samples, refined_by="samples_per_interval")
 
 
 @dataclass(frozen=True, kw_only=True)
-class PhaseOptions(SampleOptions):
-    """A phase as in the paper."""
+class SampleOptions(GridOptions):
+    """Samples of a phase, and the rule of means.
+
+    Attributes:
+        rule: of means over time: trapezoid, with the mean margins over samples, as in the paper; or simpson
+    """
+
+    rule: Quadrature = "trapezoid"
+
+    def make_grid(self, trajectory: Trajectory = "cubic") -> Grid:
+        """Return the samples, which suit the trajectory, with the rule."""
+        return replace(super().make_grid(trajectory), rule=self.rule)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepOptions:
+    """A step of one phase, and its curves.
+
+    Attributes:
+        step_length_m: from foot to foot; 0 for NAO's 0.06 m in proportion
+        trajectory: of hip, swing foot, arms and torso, or of every free joint: the paper's cubics, or cubics plus splines
+    """
 
     step_length_m: float = 0.0
     trajectory: Trajectory = "cubic"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseOptions(StepOptions, SampleOptions):
+    """A phase as in the paper.
+
+    Attributes:
+        objective: what is minimised: power as in the paper, joint jerk, torques, or their rate
+    """
+
     objective: Criterion = "power"
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoadOptions:
-    """Load of double support, see ``loads.share_torso``."""
+    """Load of double support.
+
+    Attributes:
+        torso_share: rule that divides the torso's mass between the legs in double support: lever, by which the nearer foot
+            carries more, or printed, by which the farther one does; see ``loads.share_torso``
+    """
 
     torso_share: Division = "lever"
 

@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from casadi import DM, MX
+from casadi import MX
 
 from nlp_gait.formulation import Assembly, Constraint, Objective, Parameter, Point, RowsOverTime, Signals, Variable
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
-from nlp_gait.gaits.biped.limits import make_rows
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Samples
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -48,28 +47,6 @@ CYCLE = (
     MotionSection(Support.SINGLE, Support.SINGLE, LIFT_OFF, TOUCH_DOWN, (-1, 1), TIMES[Support.SINGLE]),
     MotionSection(Support.DOUBLE, Support.DOUBLE, TOUCH_DOWN, CYCLE_END, (1, 1), TIMES[Support.DOUBLE]),
 )
-
-
-TORQUE_JUMP = "torque_jump_limit_Nm"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Switch:
-    """A switch to a phase from the one before it, at which positions and rates are continuous and torques may jump."""
-
-    name: str
-    mirrored: bool = False  # the mirror image of the phase follows, as after the last one of a cycle
-
-    def join(
-        self, phases: Mapping[Support, Phase], point: Point, before: Samples, after: Samples, ops: Nonsmooth
-    ) -> tuple[list[Constraint], dict[str, MX]]:
-        """Return the rows that join two phases, here those that limit the torques' jumps, and indexes, their largest [Nm]."""
-        body, limit = phases[Support.SINGLE].body, point[TORQUE_JUMP]
-        images, signs = body.mirror
-        first = DM(signs) * after.torque[images, 0] if self.mirrored else after.torque[:, 0]
-        jump, size = first - before.torque[:, -1], body.torque_scale
-        rows = make_rows(f"{self.name}_torque_jump", "Nm", jump, -limit, limit, body.joints, "once", size)
-        return [rows], {f"{self.name}_torque_jump_Nm": ca.mmax(ca.fabs(jump))}
 
 
 class AssembledSections(NamedTuple):

@@ -32,7 +32,7 @@ from nlp_gait.formulation.display import Tread
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
 from nlp_gait.gaits.biped.bounds import make_lift_variable
 from nlp_gait.gaits.biped.cycle import make_cycle_margins
-from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner, read_state
+from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.limits import RowsAndIndexes
@@ -42,6 +42,7 @@ from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
 from nlp_gait.gaits.biped.sequence import CYCLE, ENERGY_PER_METRE, End, MotionSection, Sequence
 from nlp_gait.gaits.biped.support_phases import limit_to_box, make_support_box
+from nlp_gait.gaits.biped.switch import read_state
 from nlp_gait.gaits.biped.walk_sections import (
     DURATION,
     GREATEST_SPEED,
@@ -205,7 +206,7 @@ def _raise_lift(variable: Variable, body: Body, flight: Flight) -> Variable:
 
 
 def plan_whole_walk(body: Body, steps: int, grid: Grid, flight: Flight | None = None) -> GaitProblem:
-    """Return the problem of a whole walk of least energy per metre; for the options see ``gaits.nao``."""
+    """Return the problem of a whole walk of least energy per metre, up a flight of stairs if it is given."""
 
     def read(point: InstantPoint, swings: bool) -> PhaseMotion:
         begin, end = (read_state(point, name, body.coordinates) for name in ("begin", "end"))

@@ -13,8 +13,9 @@ import numpy as np
 from nlp_gait.formulation import Array, GaitProblem, Variable
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
 from nlp_gait.gaits.biped.bounds import make_lift_variable, make_usual_bounds
-from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables, make_state_variables
+from nlp_gait.gaits.biped.cycle_motion import STEP, make_cycle_variables
 from nlp_gait.gaits.biped.sequence import CYCLE, CYCLE_END, LIFT_OFF, End, MotionSection
+from nlp_gait.gaits.biped.switch import SWITCHES, make_state_variables
 
 STAND = Support.STAND.value  # first pose, and state of its variables
 SHIFT = "shift_time_s"

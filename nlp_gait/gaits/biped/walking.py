@@ -1,23 +1,40 @@
-"""Options of cycles and of whole walks, and how NAO's and other humanoids' problems are made of them."""
+"""Options of cycles and of whole walks, each declared and explained once, and how the problems are made of them.
 
-from collections.abc import Callable, Sequence
+To add a joint between a cycle's phases, write a ``Switch`` (``impact.py`` is one) and add its option here: a name in ``Landing``,
+the object in ``LANDINGS``, and words to the attribute ``landing``. Both families of problems then have it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.biped.body import Body
-from nlp_gait.gaits.biped.cycle import CycleObjective, Landing, plan_cycle
+from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.footholds import Foothold, parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
+from nlp_gait.gaits.biped.impact import Impact
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.problems import LoadOptions, SampleOptions
+from nlp_gait.gaits.biped.switch import SOFT_LANDING, Switch
 from nlp_gait.gaits.biped.walk import plan_whole_walk
+
+Landing = Literal["soft", "inelastic"]
+LANDINGS: Mapping[Landing, Switch] = {"soft": SOFT_LANDING, "inelastic": Impact(name="touch_down")}
 
 
 @dataclass(frozen=True, kw_only=True)
 class CycleOptions(SampleOptions, LoadOptions):
-    """One step, whose mirror image is the next one."""
+    """One step, whose mirror image is the next one.
+
+    Attributes:
+        objective: what is minimised: energy per metre, which leaves the speed free; or power, or torque, the mean of the sum of
+            squared torques, at the speed ``speed_m_s``, a parameter: the step length is then speed times the time of the cycle
+        landing: of the swinging foot: soft, at rest; or inelastic, an impact at touch-down after which all joints continue with
+            other rates, see ``gaits.biped.impact``
+    """
 
     objective: CycleObjective = "energy-per-metre"
     landing: Landing = "soft"
@@ -25,7 +42,14 @@ class CycleOptions(SampleOptions, LoadOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class WalkOptions(SampleOptions):
-    """A walk from standing to standing."""
+    """A walk from standing to standing.
+
+    Attributes:
+        steps: swings of a foot, both half steps included
+        slope_deg: by which the ground rises forward; all places are in its axes, in which gravity is tilted
+        footholds: rows ``x,y,z,yaw`` [m, degrees], separated by semicolons: where the right foot, the left foot and so on land
+            instead; every step then has its own states
+    """
 
     steps: int = 10
     slope_deg: float = 0.0
@@ -35,7 +59,7 @@ class WalkOptions(SampleOptions):
 def make_cycle_problem(body: Body, options: CycleOptions) -> GaitProblem:
     """Return the problem of a cycle."""
     loads = make_divided_loads(body, options.torso_share)
-    return plan_cycle(body, options.make_grid(), options.objective, loads, options.landing)
+    return plan_cycle(body, options.make_grid(), options.objective, loads, LANDINGS[options.landing])
 
 
 def make_walk_problem(

@@ -1,35 +1,40 @@
-"""The humanoid problems: single support, double support and walking cycle; options are in ``gaits.humanoid``."""
+"""The humanoid problems: single support, double support and walking cycle."""
 
 from dataclasses import dataclass
 from functools import partial
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
-from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
-from nlp_gait.gaits.biped.problems import LoadOptions, PhaseOptions, make_support_problem
+from nlp_gait.gaits.biped.problems import LoadOptions, MotorOptions, PhaseOptions, make_support_problem
 from nlp_gait.gaits.biped.walking import CycleOptions, WalkOptions, make_cycle_problem, make_walk_problem
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.gaits.humanoid.turning import check_turns
 
 
 @dataclass(frozen=True, kw_only=True)
-class HumanoidOptions:
-    """The robot, and which of its limits count."""
+class HumanoidOptions(MotorOptions):
+    """The robot, and which of its limits count.
 
-    robot: str = "nao-v5"
+    Attributes:
+        drive_limits: whether torques and speeds must be within the limits of the robot's file
+    """
+
     drive_limits: bool = True
-    motors: str = ""
-    limits: str | AddedLimits = ""
 
     def make_body(self) -> Humanoid:
         """Return the robot as its gaits take it."""
-        return make_humanoid(self.robot, drive_limits=self.drive_limits, motors=self.motors, limits=self.limits)
+        return make_humanoid(**vars(self))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stairs:
-    """Sizes of each tread; none on a flat floor."""
+    """Stairs that a walk climbs.
+
+    Attributes:
+        stair_rise_m: of each tread of a flight of stairs, one with each step; 0 for no stairs
+        stair_run_m: depth of each tread, which is then the step length
+    """
 
     stair_rise_m: float = 0.0
     stair_run_m: float = 0.0
@@ -59,9 +64,6 @@ def humanoid_dsp(robot: HumanoidOptions, options: PhaseOptions, loads: LoadOptio
 def humanoid_cycle(robot: HumanoidOptions, options: CycleOptions) -> GaitProblem:
     """Walking cycle: one step, whose mirror image is the next one.
 
-    ``objective=power``, and ``torque`` for the mean of the sum of squared torques, are those at the speed ``speed_m_s``, a
-    parameter: the step length follows from it.
-
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; general legs, the free lean of the torso and the
         cycle are this package's own.
@@ -75,9 +77,6 @@ def humanoid_walk(robot: HumanoidOptions, options: WalkOptions, stairs: Stairs) 
 
     All inner steps are one cycle, as in ``humanoid-cycle``; its speed may have limits, which are parameters. The feet advance by
     one step length less than there are steps, because the first and the last one are half steps.
-
-    ``footholds``, rows ``x,y,z,yaw`` [m, degrees] separated by semicolons, are where the right foot, the left foot and so on land
-    instead; then every step has its own states.
 
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.

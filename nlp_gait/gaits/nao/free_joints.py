@@ -1,4 +1,4 @@
-"""NAO on its left foot with free joints between the paper's ends: the lower bound of all plans; options are in ``gaits.nao``.
+"""NAO on its left foot with free joints between the paper's ends: the lower bound of all plans.
 
 Each joint's angle is a cubic between the ends plus a spline that leaves the ends unchanged. At both ends the robot has the
 paper's pose: torso upright at the paper's hip positions with the hip's velocities as variables, both soles flat and at rest, arms
@@ -19,11 +19,12 @@ from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, Point, 
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import LIFT, Support, read_duration
-from nlp_gait.gaits.biped.curves import SPANS, SPLINE_SAMPLES, Splines, Trajectory
+from nlp_gait.gaits.biped.curves import SPANS, Splines, Trajectory
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_problem
+from nlp_gait.gaits.biped.problems import SPLINE_SAMPLES, GridOptions, StepOptions
 from nlp_gait.gaits.biped.samples import CORNERS, Samples
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
@@ -150,18 +151,12 @@ def fit_joints(trajectory: Trajectory, planned: GaitProblem, x: Array) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FreeOptions:
+class FreeOptions(StepOptions, GridOptions):
     """A phase whose joints are free."""
 
-    intervals: int = 10
     trajectory: Trajectory = "spline-4"
     step_length_m: float = STEP_M
     samples_per_interval: int = SPLINE_SAMPLES
-
-    def make_grid(self) -> Grid:
-        """Return the samples."""
-        samples = self.samples_per_interval
-        return Grid(intervals=self.intervals, samples_per_interval=samples, refined_by="samples_per_interval")
 
 
 @maker
@@ -171,7 +166,7 @@ def nao_ssp_free(robot: NaoOptions, options: FreeOptions) -> GaitProblem:
     Source:
         Ends, limits and objective of Gupta, Pratihar, Deb (2023), section 4.1; the formulation is this package's own.
     """
-    grid, body = options.make_grid(), robot.make_body()
+    grid, body = options.make_grid(options.trajectory), robot.make_body()
     if grid.parts % 2:
         raise InputError(f"intervals * samples_per_interval must be even, got {grid.parts}: one sample is the middle")
     step_m = body.check_step_length(options.step_length_m)
@@ -199,7 +194,7 @@ def nao_dsp_free(robot: NaoOptions, options: FreeOptions, loads: PaperLoads) -> 
     Source:
         Ends, limits, loads and objective of Gupta, Pratihar, Deb (2023), section 4.2; the formulation is this package's own.
     """
-    body, grid = make_leaning_nao(robot.make_body()), options.make_grid()
+    body, grid = make_leaning_nao(robot.make_body()), options.make_grid(options.trajectory)
     step_m = body.check_step_length(options.step_length_m)
     divided = make_divided_loads(body, loads.torso_share)
     phase = make_support_phase(body, Support.DOUBLE, step_m, options.trajectory, grid, Goal(), divided)

@@ -1,15 +1,14 @@
-"""The published phases of NAO; options are in ``gaits.nao``."""
+"""The published phases of NAO."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from nlp_gait.formulation import GaitProblem, maker
-from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.power_form import PowerForm
 from nlp_gait.gaits.biped.loads import Division
 from nlp_gait.gaits.biped.phase import Derivatives
-from nlp_gait.gaits.biped.problems import LoadOptions, PhaseOptions, make_support_problem
+from nlp_gait.gaits.biped.problems import LoadOptions, MotorOptions, PhaseOptions, RobotOptions, make_support_problem
 from nlp_gait.gaits.nao.body import Arms, NaoBody, ZmpGravity, ZmpMasses, make_nao
 
 STEP_M = 0.06
@@ -27,12 +26,14 @@ FORM_OPTIONS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class NaoOptions:
-    """The robot and its limits."""
+class NaoOptions(RobotOptions):
+    """NAO, or a robot of its build.
 
-    robot: str = "nao-v5"
+    Attributes:
+        rotational_inertia: false takes every link as a point mass, in torques and ZMP
+    """
+
     rotational_inertia: bool = True
-    limits: str | AddedLimits = ""
 
     def make_body(self) -> NaoBody:
         """Return the robot as its gaits take it."""
@@ -40,15 +41,22 @@ class NaoOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class NaoMotorOptions(NaoOptions):
+class NaoMotorOptions(NaoOptions, MotorOptions):
     """The robot, perhaps with its real motors."""
-
-    motors: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NaoReading(NaoMotorOptions):
-    """The robot in a reading of the paper."""
+    """The robot in a reading of the paper.
+
+    Attributes:
+        arms: carried by the legs, or separate: in the torques the legs carry a torso without arms, and each arm moves on a torso
+            at rest, the ZMP is that of all links; shared: likewise, but in double support both arms add to the torso's mass
+            that the legs share; held: carried, at rest in the middle of their swing
+        zmp_gravity: physical, or as printed in (19) and (20): the inertial part of the ZMP has the opposite sign, and links are
+            point masses in it. It moves the margins of the printed solutions by up to 0.9 mm in single and 2.9 mm in double
+            support
+    """
 
     arms: Arms = "carried"
     zmp_gravity: ZmpGravity = "physical"
@@ -56,14 +64,24 @@ class NaoReading(NaoMotorOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class DoubleSupportReading(NaoReading):
-    """The same in double support."""
+    """The same in double support.
+
+    Attributes:
+        zmp_masses: 23: neck and head of double support are at the torso's centre of mass in the ZMP, as the text counts there (25
+            in single support); moves the least margins by up to 0.3 mm
+    """
 
     zmp_masses: ZmpMasses = 25
 
 
 @dataclass(frozen=True, kw_only=True)
 class PaperPhase(PhaseOptions):
-    """A phase of the paper's step length."""
+    """A phase of the paper's step length.
+
+    Attributes:
+        derivatives: analytic, or finite-difference: of the sampled angles, as in the paper, of first order at the ends;
+            finite-difference-2: of second order there, too
+    """
 
     step_length_m: float = STEP_M
     derivatives: Derivatives = "analytic"

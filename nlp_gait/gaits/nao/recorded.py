@@ -17,13 +17,14 @@ from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Support
 from nlp_gait.gaits.biped.bounds import make_hip_variables, make_lift_variable, make_time_variable
 from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins, make_cycle_problem
-from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables
+from nlp_gait.gaits.biped.cycle_motion import STEP, make_cycle_variables
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import BalanceMargins, Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.loads import Division, make_divided_loads, make_single_support_loads
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.samples import CORNERS, LEAST_DURATION, Samples
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
+from nlp_gait.gaits.biped.switch import SWITCHES
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.gaits.nao.joint_phase import JointPhase
 from nlp_gait.gaits.nao.recorded_motion import FINE, RecordedMotion, make_places_function, read_motion

@@ -1,4 +1,4 @@
-"""Walking of NAO: its cycle and its whole walk; options are in ``gaits.nao``."""
+"""Walking of NAO: its cycle and its whole walk."""
 
 from collections.abc import Sequence
 
@@ -17,9 +17,7 @@ def nao_cycle(robot: NaoMotorOptions, options: CycleOptions) -> GaitProblem:
     starts 0.01 m ahead of it, and arms and velocities differ too. Here the states at both switches, the times and the step
     length are variables, and the cycle repeats after mirroring left to right.
 
-    ``objective="energy-per-metre"`` leaves the speed free; ``"power"``, and ``"torque"`` for the mean of the sum of squared
-    torques, are those at the speed ``speed_m_s``, a parameter: the step length is then speed times the time of the cycle. By
-    ``torso_share="lever"`` the nearer foot carries more, so that the load passes from foot to foot; as printed, the farther one.
+    By ``torso_share="lever"`` the load passes from foot to foot.
 
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walking cycle by this package.
@@ -34,9 +32,7 @@ def nao_walk(robot: NaoMotorOptions, options: WalkOptions) -> GaitProblem:
     All inner steps are one cycle, as in ``nao-cycle``; its speed may have limits, which are parameters. The feet advance by one
     step length less than there are steps, because the first and the last one are half steps.
 
-    ``steps`` are swings of a foot, both half steps included. On ground that rises forward by ``slope_deg`` all places are in its
-    axes, in which gravity is tilted. ``footholds``, rows ``x,y,z,yaw`` [m, degrees] separated by semicolons, are where the right
-    foot, the left foot and so on land instead; then every step has its own states. All angles are 0: one motor turns both feet.
+    All angles of ``footholds`` are 0: one motor turns both feet.
 
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
