@@ -10,15 +10,9 @@ import numpy as np
 
 from compare.analysis.best_known import ZERO, compute_gap, is_zero
 from compare.analysis.pairs import Pair, compare_pairs, describe_power
-from compare.analysis.record_statistics import (
-    Curve,
-    compute_running_time,
-    find_best_known,
-    make_curve,
-    tie,
-)
+from compare.analysis.record_statistics import Curve, compute_running_time, find_best_known, make_curve, tie
 from compare.analysis.units import format_percent, with_unit
-from compare.study.record import RunRecord
+from compare.study.record import RunRecord, find_best, group_by
 from compare.study.references import BETTER, Reference, find_reference
 from compare.study.task import GRADIENT_SOLVERS, SOURCE
 from nlp_gait.errors import InputError
@@ -35,7 +29,11 @@ class SolverRuns:
     name: str
     records: tuple[RunRecord, ...]  #: ascending in the run's number
     curves: tuple[Curve, ...]
-    costs: tuple[float, ...]  #: judge's objective of each run, to be minimised; infinite where it is not feasible
+
+    @cached_property
+    def costs(self) -> tuple[float, ...]:
+        """Judge's objective of each run, to be minimised; infinite where it is not feasible."""
+        return tuple(record.cost for record in self.records)
 
     @property
     def feasible(self) -> list[float]:
@@ -60,8 +58,7 @@ class SolverRuns:
     @property
     def best(self) -> RunRecord | None:
         """Best feasible run, None without one."""
-        index = int(np.argmin(self.costs))
-        return self.records[index] if math.isfinite(self.costs[index]) else None
+        return find_best(self.records)
 
     def has_costs(self, axis: str) -> bool:
         """Return whether the cost of every run is known, in evaluations or seconds; imported results may lack it."""
@@ -94,8 +91,7 @@ class Comparison:
     @cached_property
     def best(self) -> RunRecord | None:
         """Best feasible run of all solvers; None without one."""
-        feasible = [record for record in self.records if record.verdict.feasible]
-        return min(feasible, key=lambda r: self.objective.sign * r.verdict.objective, default=None)
+        return find_best(self.records)
 
     @property
     def better(self) -> RunRecord | None:
@@ -150,10 +146,8 @@ def compare_problems(
     Gaps are measured from a problem's entry in ``references``, else from the shipped best known value of exactly this
     problem, else from the best of the records.
     """
-    groups: dict[str, list[RunRecord]] = {}
-    for record in records:
-        groups.setdefault(record.problem, []).append(record)
-    return [_make_comparison(name, group, (references or {}).get(name)) for name, group in groups.items()]
+    groups = group_by(records, lambda record: record.problem).items()
+    return [_make_comparison(name, group, (references or {}).get(name)) for name, group in groups]
 
 
 def _make_comparison(problem: str, records: Sequence[RunRecord], reference: float | None) -> Comparison:
@@ -163,26 +157,14 @@ def _make_comparison(problem: str, records: Sequence[RunRecord], reference: floa
             raise InputError(f"records of {problem!r} disagree on the objective: {record.solver}, run {record.run}")
     known = find_reference(records[0].inputs.problem)
     if reference is None:
-        reference = find_best_known(records, objective) if known.objective is None else known.objective
+        reference = find_best_known(records) if known.objective is None else known.objective
     solvers = []
-    for name in dict.fromkeys(record.solver for record in records):
-        runs = tuple(sorted((r for r in records if r.solver == name), key=lambda r: r.run))
-        solvers.append(
-            SolverRuns(
-                name=name,
-                records=runs,
-                curves=tuple(make_curve(r, objective, reference) for r in runs),
-                costs=tuple(objective.sign * r.verdict.objective if r.verdict.feasible else math.inf for r in runs),
-            )
-        )
+    for name, group in group_by(records, lambda record: record.solver).items():
+        runs = tuple(sorted(group, key=lambda record: record.run))
+        curves = tuple(make_curve(record, objective, reference) for record in runs)
+        solvers.append(SolverRuns(name=name, records=runs, curves=curves))
     solvers.sort(key=lambda s: (s.median_cost, min(s.costs), s.name))
-    return Comparison(
-        problem=problem,
-        objective=objective,
-        reference=reference,
-        known=known,
-        solvers=tuple(solvers),
-    )
+    return Comparison(problem=problem, objective=objective, reference=reference, known=known, solvers=tuple(solvers))
 
 
 def index_solvers(comparisons: Sequence[Comparison]) -> tuple[list[dict[str, SolverRuns]], list[str]]:

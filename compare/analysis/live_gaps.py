@@ -30,7 +30,7 @@ class LiveGaps:
 
 def _list_gaps(records: Sequence[RunRecord], known: float | None) -> list[str]:
     objective = records[0].inputs.objective
-    reference = find_best_known(records, objective) if known is None else known
+    reference = find_best_known(records) if known is None else known
     gaps: dict[str, list[float]] = {}
     for record in records:
         value = record.verdict.objective if record.verdict.feasible else math.nan

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.analysis.best_known import compute_gap, is_zero
-from compare.study.record import RunRecord
+from compare.study.record import RunRecord, find_best
 from nlp_gait.formulation import Array, Objective
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
@@ -86,10 +86,10 @@ def tie(samples: Sequence[Sequence[float]], reference: float) -> list[list[float
     return [[least[cost] for cost in sample] for sample in samples]
 
 
-def find_best_known(records: Sequence[RunRecord], objective: Objective) -> float:
+def find_best_known(records: Sequence[RunRecord]) -> float:
     """Return the best objective of the feasible records; NaN without any."""
-    costs = [objective.sign * r.verdict.objective for r in records if r.verdict.feasible]
-    return objective.sign * min(costs) if costs else math.nan
+    best = find_best(records)
+    return math.nan if best is None else best.verdict.objective
 
 
 def compute_running_time(reached: Sequence[float], totals: Sequence[float]) -> float:

@@ -7,7 +7,6 @@ import json
 import math
 import random
 import time
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
@@ -19,7 +18,7 @@ from compare.archive.unpack import unpack_archive
 from compare.report import FurtherFiles, write_report
 from compare.study.evidence import CheckedRecords, compute_in_forks, name_record, read_evidence
 from compare.study.origin import hash_installed_code
-from compare.study.record import RunRecord, load_problem
+from compare.study.record import RunRecord, find_best, group_by, load_problem
 from compare.study.record_files import RECORDS, name_run
 from compare.study.run_task import try_task
 from compare.study.settings import FILE, Manifest, read_manifest
@@ -183,13 +182,11 @@ def _check_plan(folder: Path, manifest: Manifest, records: Sequence[RunRecord]) 
     wrong = [f"{name} has no record" for name in manifest.runs if not (folder / RECORDS / f"{name}.json").is_file()]
     for key in planned.keys() - there.keys():
         wrong.append(f"{key[0]}, {key[1]}, run {key[2]} is planned, but missing")
-    groups: dict[tuple[str, str], list[RunRecord]] = defaultdict(list)
     for key, record in there.items():
-        groups[key[:2]].append(record)
         if task := planned.get(key):
             wrong += [f"{name_record(record)} has other {what} than planned" for what in _find_deviations(record, task)]
     commanded = {key[:2] for key in planned}
-    for group, runs in groups.items():
+    for group, runs in group_by(there.values(), lambda r: (r.problem, r.solver)).items():
         if group in commanded:
             wrong += [f"{name_record(r)} is not planned" for r in runs if (r.problem, r.solver, r.run) not in planned]
         elif {r.run for r in runs} != set(range(len(runs))) or len({r.seed - r.run for r in runs}) > 1:
@@ -295,10 +292,9 @@ def _choose_runs(records: Sequence[RunRecord], share: float | None) -> tuple[lis
         count = math.ceil(share * len(known))
         return known[:count], count
     first: dict[object, RunRecord] = {}
-    priced = [r for r in known if r.active_constraints and r.verdict.feasible]
-    priced.sort(key=lambda r: r.inputs.objective.sign * r.verdict.objective)
-    for record in priced:  # the report shows the prices of the best one
-        first.setdefault(record.problem, record)
+    for problem, runs in group_by(known, lambda record: record.problem).items():
+        if best := find_best(run for run in runs if run.active_constraints):  # whose prices the report shows
+            first[problem] = best
     for record in known:
         first.setdefault((record.problem, record.solver), record)
     needed = {id(record): record for record in first.values()}

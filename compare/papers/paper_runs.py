@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from compare.report.document import Table, Value
-from compare.study.record import RunRecord
+from compare.study.record import RunRecord, group_by
 from compare.study.record_files import locate_record
 from compare.study.run_study import Study, run_study
 from compare.study.store import Computation, Store
@@ -125,9 +125,7 @@ def tabulate(name: str, caption: str, rows: Sequence[Mapping[str, Value]], *, pr
 
 def tabulate_runs(records: Iterable[RunRecord]) -> Table:
     """Return how the runs of each solver end, on problems with runs of a search."""
-    groups: dict[tuple[str, str], list[RunRecord]] = {}
-    for record in records:
-        groups.setdefault((record.problem, record.solver), []).append(record)
+    groups = group_by(records, lambda record: (record.problem, record.solver))
     searched = {problem for problem, solver in groups if solver != IPOPT}
     rows = list[Mapping[str, Value]]()
     for (problem, solver), runs in sorted(groups.items()):

@@ -8,7 +8,7 @@ from compare.analysis.record_statistics import find_best_known
 from compare.analysis.units import format_percent, with_unit
 from compare.report.document import Prose, Table, make_text_table
 from compare.study.description import describe_solver, list_described_names
-from compare.study.record import RunRecord
+from compare.study.record import RunRecord, group_by
 from compare.study.references import find_reference
 from nlp_gait.backends.identity import hash_json, make_key
 
@@ -34,10 +34,7 @@ def explain(heading: str) -> str:
 
 def make_solver_table(records: Iterable[RunRecord]) -> Table:
     """Return settings, budget and seeds of the solvers of all records, a row for each difference."""
-    groups: dict[tuple[str, str, str], list[RunRecord]] = {}
-    for record in records:
-        key = record.solver, format_settings(record.inputs.settings), describe_budget(record)
-        groups.setdefault(key, []).append(record)
+    groups = group_by(records, lambda r: (r.solver, format_settings(r.inputs.settings), describe_budget(r)))
     rows = []
     for (solver, *_), group in groups.items():
         run = next((r for r in group if r.settings), group[0])  # a failed run has none
@@ -52,13 +49,10 @@ def make_solver_table(records: Iterable[RunRecord]) -> Table:
 
 def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
     """Return the best of the records next to the shipped best known value, a row for each problem that has one."""
-    groups: dict[str, list[RunRecord]] = {}
-    for record in records:
-        groups.setdefault(hash_json(make_key(record.inputs.problem)), []).append(record)
     rows = []
-    for group in groups.values():
+    for group in group_by(records, lambda record: hash_json(make_key(record.inputs.problem))).values():
         known, objective = find_reference(group[0].inputs.problem), group[0].inputs.objective
-        best = find_best_known(group, objective)
+        best = find_best_known(group)
         if known.objective is not None:
             gap = format_percent(compute_gap(best, known.objective, objective))
             values = (with_unit(value, objective.unit) for value in (best, known.objective))

@@ -22,7 +22,7 @@ from compare.report.document import Figure, Part, Prose, Section, Table, make_ta
 from compare.report.interactive import describe_gaits
 from compare.report.provenance import TERMS, format_settings, make_solver_table
 from compare.report.writing import make_citation_section, make_session_section
-from compare.study.record import RunRecord, load_gait
+from compare.study.record import RunRecord, find_best, load_gait
 from compare.study.settings import Session
 from nlp_gait.errors import GaitError
 from nlp_gait.files import make_file_name
@@ -173,15 +173,9 @@ def list_optimum(comparison: Comparison, gaits: Mapping[str, GaitCurves] | str) 
 
 
 def _list_active(comparison: Comparison) -> tuple[Section, ...]:
-    priced = [
-        (cost, record)
-        for solver in comparison.solvers
-        for cost, record in zip(solver.costs, solver.records, strict=True)
-        if record.active_constraints and record.verdict.feasible
-    ]
-    if not priced:
+    record = find_best(record for record in comparison.records if record.active_constraints)
+    if record is None:
         return ()
-    record = min(priced, key=lambda item: item[0])[1]
     rows = [
         (
             active.name,

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple, TypeVar
 
 from compare.judge import evaluate
 from compare.study.origin import hash_installed_code
-from compare.study.record import RunRecord, Verdict, load_problem
+from compare.study.record import RunRecord, Verdict, group_by, load_problem
 from compare.study.record_files import read_each
 from compare.study.references import SAME_VALUE, find_reference
 from nlp_gait.backends.exact import ExactValues, build_exact_model
@@ -64,19 +64,21 @@ class CheckedRecords(NamedTuple):
 
 
 @dataclass(kw_only=True)
-class Context:
-    """What a record is compared with."""
+class CheckedRun:
+    """A record, what it is compared with, and what is wrong with it."""
 
+    record: RunRecord
+    reasons: list[str] = field(default_factory=list)  #: why it is no evidence
     problem: GaitProblem | None = None  #: None if it cannot be loaded
     needs_code: bool = False  #: that the command does not name
     objections: list[str] = field(default_factory=list)  #: to the problem or the point, which prevent an evaluation
     exact: ExactValues | None = None  #: at its x; None if not evaluated
     bound: float | None = None  #: proven: no feasible point has a better objective
-    first: Mapping[str, RunRecord] = field(default_factory=dict)  #: with the same mark, see ``_list_marks``
+    first: tuple[RunRecord, ...] = ()  #: with this label, with this solver, and with this seed of the solver
     code: tuple[str, str] | None = None  #: hash of the code, and version of CasADi, of most records
 
 
-Check = Callable[[RunRecord, Context], str | None]
+Check = Callable[[CheckedRun], str | None]
 """Returns what is wrong with a record; None if nothing is."""
 
 
@@ -94,20 +96,16 @@ def check_records(
         between_samples: for which runs the verdict between the samples is repeated, a tenth of a second each: for the best one of
             every solver, all or none.
     """
-    contexts = _make_contexts(records, find_problem or load_problem)
-    pairs = list(zip(records, contexts, strict=True))
-    reasons = [[reason for check in CHECKS if (reason := check(*pair))] for pair in pairs]
-    chosen = list(_choose_runs(pairs, reasons, between_samples))
-    for k in {id(contexts[k].problem): k for k in chosen}.values():  # builds what the forks inherit
-        check_between_samples(*pairs[k])
-    for k, reason in zip(chosen, compute_in_forks(lambda k: check_between_samples(*pairs[k]), chosen), strict=True):
-        reasons[k] += [reason] if reason else []
-    excluded = [
-        Exclusion(name_record(r), tuple(why), r, context.needs_code)
-        for (r, context), why in zip(pairs, reasons, strict=True)
-        if why
-    ]
-    return CheckedRecords([record for record, why in zip(records, reasons, strict=True) if not why], excluded)
+    cases = _make_cases(records, find_problem or load_problem)
+    for case in cases:
+        case.reasons += filter(None, (check(case) for check in CHECKS))
+    chosen = list(_choose_cases(cases, between_samples))
+    for case in {id(case.problem): case for case in chosen}.values():  # builds what the forks inherit
+        check_between_samples(case)
+    for case, reason in zip(chosen, compute_in_forks(check_between_samples, chosen), strict=True):
+        case.reasons += filter(None, [reason])
+    excluded = [Exclusion(name_record(c.record), tuple(c.reasons), c.record, c.needs_code) for c in cases if c.reasons]
+    return CheckedRecords([case.record for case in cases if not case.reasons], excluded)
 
 
 def read_evidence(
@@ -134,14 +132,6 @@ def name_record(record: RunRecord) -> str:
     return f"{record.problem}, {record.solver}, run {record.run}"
 
 
-def group_by(records: Sequence[RunRecord], key: Callable[[RunRecord], object]) -> list[list[int]]:
-    """Return the positions of records with equal keys."""
-    groups: dict[object, list[int]] = {}
-    for k, record in enumerate(records):
-        groups.setdefault(key(record), []).append(k)
-    return list(groups.values())
-
-
 def compute_in_forks(call: Callable[[T], R], items: Sequence[T], stop: Callable[[], bool] = never) -> Iterator[R]:
     """Yield call(item) of each item in order, in forks where they pay; after ``stop`` returns True, no further one is begun."""
     workers = min(count_workers(), len(items) // 2)
@@ -161,77 +151,67 @@ def is_same(a: float, b: float, scale: float = 0.0) -> bool:
     return abs(a - b) <= SAME_VALUE * max(abs(a), abs(b), scale)
 
 
-def _make_contexts(records: Sequence[RunRecord], find_problem: Callable[[RunRecord], GaitProblem]) -> list[Context]:
+def _make_cases(records: Sequence[RunRecord], find_problem: Callable[[RunRecord], GaitProblem]) -> list[CheckedRun]:
     """Load each problem once, and evaluate all of its points."""
-    contexts = [Context() for _ in records]
-    for group in group_by(records, lambda record: hash_json(record.inputs.problem)):
-        stored = records[group[0]].inputs.problem
-        try:
-            problem = find_problem(records[group[0]])
-            difference = describe_difference(stored, identify_problem(problem))
-            bound = find_reference(stored).bound
-        except (GaitError, ValueError) as error:
-            for k in group:
-                contexts[k].needs_code = isinstance(error, UserCodeError)
-                contexts[k].objections.append(f"its problem cannot be evaluated: {error}")
-            continue
-        for k in group:
-            contexts[k].problem, contexts[k].bound = problem, bound
-            contexts[k].objections += [f"its problem has changed since: {difference}"] if difference else []
-        _evaluate_points(problem, [(records[k], contexts[k]) for k in group])
+    cases = [CheckedRun(record=record) for record in records]
+    for group in group_by(cases, lambda case: hash_json(case.record.inputs.problem)).values():
+        _evaluate_points(group, find_problem)
     codes = Counter((r.inputs.code, r.origin.casadi) for r in records if r.origin is not None)
     installed = [code for code in codes if code[0] == hash_installed_code()]
     usual = max(installed or codes, key=lambda code: codes[code], default=None)
     seen: dict[object, RunRecord] = {}
-    for k in sorted(range(len(records)), key=lambda k: records[k].run):
-        marks = _list_marks(records[k])
-        contexts[k].first = {kind: seen.setdefault((kind, *mark), records[k]) for kind, mark in marks.items()}
-        contexts[k].code = usual
-    return contexts
+    for case in sorted(cases, key=lambda case: case.record.run):
+        solver = case.record.problem, case.record.solver, case.record.inputs.solver_key
+        marks = (solver[:2], solver, (*solver, case.record.seed))
+        case.first = tuple(seen.setdefault(mark, case.record) for mark in marks)
+        case.code = usual
+    return cases
 
 
-def _list_marks(record: RunRecord) -> dict[str, tuple[object, ...]]:
-    """Return what all runs of a label or of a solver share, and what only one run of a solver may have, by kind."""
-    solver = record.problem, record.solver, record.inputs.solver_key
-    return {"label": solver[:2], "solver": solver, "seed": (*solver, record.seed)}
-
-
-def _evaluate_points(problem: GaitProblem, pairs: Sequence[tuple[RunRecord, Context]]) -> None:
-    """Fill in the exact values at the points of a problem."""
+def _evaluate_points(cases: Sequence[CheckedRun], find_problem: Callable[[RunRecord], GaitProblem]) -> None:
+    """Fill in problem, bound and exact values of records with one problem, or why they cannot be evaluated."""
+    stored = cases[0].record.inputs.problem
+    try:
+        problem = find_problem(cases[0].record)
+        difference = describe_difference(stored, identify_problem(problem))
+        bound = find_reference(stored).bound
+    except (GaitError, ValueError) as error:
+        for case in cases:
+            case.needs_code = isinstance(error, UserCodeError)
+            case.objections.append(f"its problem cannot be evaluated: {error}")
+        return
     model = build_exact_model(problem)
-    for record, context in pairs:
+    for case in cases:
+        case.problem, case.bound = problem, bound
+        case.objections += [f"its problem has changed since: {difference}"] if difference else []
         try:
-            context.exact = model.at(problem.check_x(record.x), problem.p) if record.x else None
+            case.exact = model.at(problem.check_x(case.record.x), problem.p) if case.record.x else None
         except (GaitError, ValueError) as error:
-            context.objections.append(f"its point does not belong to the problem: {error}")
+            case.objections.append(f"its point does not belong to the problem: {error}")
 
 
-def _choose_runs(
-    pairs: Sequence[tuple[RunRecord, Context]], reasons: Sequence[Sequence[str]], scope: Scope
-) -> Iterator[int]:
-    """Yield the positions of runs whose verdict between the samples is repeated."""
-    records = [record for record, _ in pairs]
-    signs = [record.inputs.objective.sign for record in records]
-    cost = [s * r.verdict.objective if r.verdict.feasible else math.inf for s, r in zip(signs, records, strict=True)]
-    for group in group_by(records, lambda r: (hash_json(r.inputs.problem), r.solver)):
-        chosen = {"none": [], "all": group, "best": [min(group, key=lambda k: cost[k])]}[scope]
-        for k in chosen:
-            if not reasons[k] and records[k].x and (scope == "all" or math.isfinite(cost[k])):
-                yield k
+def _choose_cases(cases: Sequence[CheckedRun], scope: Scope) -> Iterator[CheckedRun]:
+    """Yield the runs whose verdict between the samples is repeated."""
+    for group in group_by(cases, lambda c: (hash_json(c.record.inputs.problem), c.record.solver)).values():
+        chosen = {"none": [], "all": group, "best": [min(group, key=lambda case: case.record.cost)]}[scope]
+        for case in chosen:
+            if not case.reasons and case.record.x and (scope == "all" or math.isfinite(case.record.cost)):
+                yield case
 
 
-def check_problem(record: RunRecord, context: Context) -> str | None:
+def check_problem(case: CheckedRun) -> str | None:
     """Check that the problem is the same today, and that the point belongs to it."""
-    if context.objections:
-        return "; ".join(context.objections)
-    if context.problem is not None and record.inputs.objective != context.problem.objective:
-        return f"its objective is {record.inputs.objective}, that of the problem {context.problem.objective}"
+    stated = case.record.inputs.objective
+    if case.objections:
+        return "; ".join(case.objections)
+    if case.problem is not None and stated != case.problem.objective:
+        return f"its objective is {stated}, that of the problem {case.problem.objective}"
     return None
 
 
-def check_verdict(record: RunRecord, context: Context) -> str | None:
+def check_verdict(case: CheckedRun) -> str | None:
     """Compare the verdict with what is evaluated at x; a run without a point has none."""
-    verdict, exact = record.verdict, context.exact
+    record, verdict, exact = case.record, case.record.verdict, case.exact
     judged = verdict.feasible or math.isfinite(verdict.objective) or verdict.indexes or verdict.dense
     if not record.x:
         return "it has a verdict, but no point" if judged or verdict.guaranteed else None
@@ -255,24 +235,24 @@ def check_verdict(record: RunRecord, context: Context) -> str | None:
     return "; ".join(differences) or None
 
 
-def check_bound(record: RunRecord, context: Context) -> str | None:
+def check_bound(case: CheckedRun) -> str | None:
     """Find a feasible objective that no feasible point can have."""
-    verdict, bound, sign = record.verdict, context.bound, record.inputs.objective.sign
+    verdict, bound, sign = case.record.verdict, case.bound, case.record.inputs.objective.sign
     slack = SAME_VALUE if verdict.violation == 0.0 else SLACK
     if bound is None or not verdict.feasible or not sign * (bound - verdict.objective) > slack * abs(bound):
         return None
     return f"its objective {verdict.objective:.9g} is better than the proven bound {bound:.9g}"
 
 
-def check_history(record: RunRecord, context: Context) -> str | None:
+def check_history(case: CheckedRun) -> str | None:
     """Check that the history ends at the judged value, and at the number of evaluations that the run counts."""
-    inputs, history, judged = record.inputs, record.history, record.verdict.objective
+    inputs, history, judged = case.record.inputs, case.record.history, case.record.verdict.objective
     last = history.objective[-1] if history.objective else None
     tolerance = END_OF_SEARCH if inputs.is_search else END_OF_IMPORT if inputs.imported else END_OF_SOLVER
     if last is not None and not abs(last - judged) <= tolerance * max(abs(last), abs(judged)):
         return f"its history ends at {last:.9g}, but the judge finds {judged:.9g}"
     counted, budget = history.evaluations[-1] if history.evaluations else 0, inputs.stop.get("evaluations")
-    f = record.evaluations.get("f", counted)
+    f = case.record.evaluations.get("f", counted)
     if not inputs.imported and (counted > f or (inputs.is_search and history.evaluations and counted != f)):
         return f"its history ends after {counted} evaluations, but it counts {f}"
     if inputs.is_search and budget is not None and f > budget:
@@ -280,36 +260,37 @@ def check_history(record: RunRecord, context: Context) -> str | None:
     return None
 
 
-def check_settings(record: RunRecord, context: Context) -> str | None:
+def check_settings(case: CheckedRun) -> str | None:
     """Find a run whose settings are not those of the other runs of its name, or whose seed is that of another one."""
-    other, first = context.first.get("label", record), context.first.get("solver", record)
+    record, (other, first, twin) = case.record, case.first
     if other.inputs.solver_key != record.inputs.solver_key:
         return f"its inputs are not those of run {other.run} of the same name; give the solvers different labels"
     if record.inputs.is_search and record.x and first.x and record.settings != first.settings:
         return f"its settings are not those of run {first.run}"
-    if (twin := context.first.get("seed", record)) is not record:
+    if twin is not record:
         return f"its seed {record.seed} repeats that of run {twin.run}"
     return None
 
 
-def check_code(record: RunRecord, context: Context) -> str | None:
+def check_code(case: CheckedRun) -> str | None:
     """Find a run of other code than the installed one, or, if no record is of that, than most records."""
-    if record.inputs.imported or context.code is None:
+    record = case.record
+    if record.inputs.imported or case.code is None:
         return None
     if record.origin is None or not record.inputs.code:
         return "it does not say which code computed it"
     code = record.inputs.code, record.origin.casadi
-    if code == context.code:
+    if code == case.code:
         return None
-    found, usual = (f"{digest[:8]}, CasADi {casadi}" for digest, casadi in (code, context.code))
+    found, usual = (f"{digest[:8]}, CasADi {casadi}" for digest, casadi in (code, case.code))
     return f"it was computed by other code ({found}) than the others ({usual})"
 
 
-def check_between_samples(record: RunRecord, context: Context) -> str | None:
+def check_between_samples(case: CheckedRun) -> str | None:
     """Judge a point again between the samples, as a run does: on the dense grid, and by proof."""
-    assert context.problem is not None  # for the type checker
-    stated = record.verdict
-    again = Verdict.from_evaluation(evaluate(context.problem, context.problem.check_x(record.x)))
+    assert case.problem is not None  # for the type checker
+    stated = case.record.verdict
+    again = Verdict.from_evaluation(evaluate(case.problem, case.problem.check_x(case.record.x)))
     if stated.dense_feasible != again.dense_feasible or not _are_same(stated.dense, again.dense):
         return "its verdict on the dense grid does not follow from its x"
     words = ["nothing" if v.guaranteed is None else v.guaranteed.word for v in (stated, again)]

@@ -9,10 +9,10 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from compare.judge import Evaluation
 from compare.study.origin import Origin, format_now
@@ -26,6 +26,9 @@ from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
 from nlp_gait.notebook import import_pandas
 from nlp_gait.proofs.guarantee import Guarantee
+
+T = TypeVar("T")
+K = TypeVar("K")
 
 SCHEMA = 5
 OPTIONAL = {"origin", "finished"}  # fields that a file may lack
@@ -140,6 +143,11 @@ class RunRecord:
         return self.inputs.seed
 
     @property
+    def cost(self) -> float:
+        """The judge's objective, to be minimised; infinite where the run is not feasible."""
+        return self.inputs.objective.sign * self.verdict.objective if self.verdict.feasible else math.inf
+
+    @property
     def objective_text(self) -> str:
         """The judge's objective, for example ``power 0.845869 W``."""
         if not self.verdict.feasible:
@@ -153,6 +161,20 @@ class RunRecord:
     def to_json(self) -> dict[str, Any]:
         """Return plain data with a schema version; numbers that are not finite become null."""
         return {"schema": SCHEMA, **replace_nan(self)}
+
+
+def find_best(records: Iterable[RunRecord]) -> RunRecord | None:
+    """Return the best feasible record; None without any."""
+    best = min(records, key=lambda record: record.cost, default=None)
+    return best if best is not None and best.verdict.feasible else None
+
+
+def group_by(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
+    """Return lists of items by a key of each, in the order of the first ones."""
+    groups: dict[K, list[T]] = {}
+    for item in items:
+        groups.setdefault(key(item), []).append(item)
+    return groups
 
 
 def read_record(path: Path) -> RunRecord:

@@ -170,12 +170,15 @@ def test_holm_lies_between_none_and_bonferroni_and_keeps_the_order(p: list[float
 
 
 def test_best_known_is_the_best_that_the_judge_accepts() -> None:
-    records = [
-        record("pso", run, [(10, value)], feasible=run != 2) for run, value in enumerate((12.0, 11.0, 9.0, 13.0))
-    ]
-    assert find_best_known(records, POWER) == 11.0
-    assert find_best_known(records, Objective(name="margin", unit="m", sense="maximise")) == 13.0
-    assert math.isnan(find_best_known(records[2:3], POWER)) and math.isnan(find_best_known([], POWER))
+    values = (12.0, 11.0, 9.0, 13.0)
+    margin = Objective(name="margin", unit="m", sense="maximise")
+    powers, margins = (
+        [record("pso", run, [(10, value)], feasible=run != 2, objective=objective) for run, value in enumerate(values)]
+        for objective in (POWER, margin)
+    )
+    assert find_best_known(powers) == 11.0
+    assert find_best_known(margins) == 13.0
+    assert math.isnan(find_best_known(powers[2:3])) and math.isnan(find_best_known([]))
 
 
 @given(costs, costs)
