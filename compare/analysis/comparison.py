@@ -9,8 +9,16 @@ from statistics import median
 import numpy as np
 
 from compare.analysis.best_known import ZERO, compute_gap, is_zero
-from compare.analysis.pairs import Pair, compare_pairs, describe_power
-from compare.analysis.record_statistics import Curve, compute_running_time, find_best_known, make_curve, tie
+from compare.analysis.record_statistics import (
+    Curve,
+    Pair,
+    compare_pairs,
+    compute_running_time,
+    describe_power,
+    find_best_known,
+    make_curve,
+    tie,
+)
 from compare.analysis.units import format_percent, with_unit
 from compare.study.record import RunRecord, find_best, group_by
 from compare.study.references import BETTER, Reference, find_reference
@@ -117,9 +125,19 @@ class Comparison:
     @property
     def leaders(self) -> set[str]:
         """Solver with the best median and those that do not differ from it significantly; empty without any test."""
-        from_leader = [pair for pair in self.pairs if pair.first == self.solvers[0].name]
-        others = {pair.second for pair in from_leader if not pair.is_significant}
-        return {self.solvers[0].name, *others} if from_leader else set()
+        leader = self.solvers[0].name
+        results = self.compare_with_others(leader)
+        return {leader, *(other for other, result in results.items() if result == 0)} if results else set()
+
+    def compare_with_others(self, solver: str) -> dict[str, int]:
+        """Return 1, 0 or -1 by the name of each other solver: this one is significantly better, not different, or worse."""
+        results: dict[str, int] = {}
+        for pair in self.pairs:
+            if pair.first == solver:
+                results[pair.second] = +pair.is_significant
+            elif pair.second == solver:
+                results[pair.first] = -pair.is_significant
+        return results
 
     def count_reached(self, solver: SolverRuns) -> int:
         """Return the number of runs of a solver that reach the best known value."""

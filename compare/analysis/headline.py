@@ -1,4 +1,4 @@
-"""The answer of a study in one sentence per problem, or over many problems."""
+"""A study in sentences: its answer for each problem or over many, also while it runs, and what is missing in it."""
 
 import math
 from collections import Counter
@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from statistics import median
 
 from compare.analysis.best_known import compute_gap
-from compare.analysis.comparison import FOUND, Comparison, SolverRuns, index_solvers
+from compare.analysis.comparison import FOUND, SMALLEST_GAP, Comparison, SolverRuns, index_solvers
 from compare.analysis.overview import count_wins, list_user_solvers
+from compare.analysis.record_statistics import find_best_known
 from compare.analysis.units import format_number, format_percent, join_words, with_unit
-from compare.study.references import describe_gap
+from compare.study.record import RunRecord, group_by
+from compare.study.references import describe_gap, find_reference
 from nlp_gait.gaitbench.facts import SIX_DIGITS
 
+PLACES = {"behind": -1, "before": 1}
 MANY = 5  # problems, from which on there are statistics over problems, and one headline for all
 
 
@@ -65,10 +68,9 @@ def _describe_user_solver(comparison: Comparison, solver: SolverRuns) -> str:
     side = _describe_side(comparison)
     end = f"reaches {best}" if gap <= FOUND else f"ends {_format_gap(comparison, gap)} {side} {best}"
     runs = f"{len(solver.records)} runs" if len(solver.records) != 1 else "1 run"
-    significant = [p for p in comparison.pairs if solver.name in (p.first, p.second) and p.is_significant]
-    behind = [pair.first for pair in significant if pair.second == solver.name]
-    before = [pair.second for pair in significant if pair.first == solver.name]
-    places = [f"{word} {join_words(names)}" for word, names in (("behind", behind), ("before", before)) if names]
+    results = comparison.compare_with_others(solver.name)
+    found = {word: [other for other in results if results[other] == sign] for word, sign in PLACES.items()}
+    places = [f"{word} {join_words(others)}" for word, others in found.items() if others]
     return f"{solver.name} {end} (median of {runs}{''.join(f', {place}' for place in places)})"
 
 
@@ -154,3 +156,53 @@ def write_overall_headline(comparisons: Sequence[Comparison]) -> str:
     sentences.append(f"Best known values reached, of {len(comparisons)}: {best or 'none'}.")
     better = join_words(c.problem for c in comparisons if c.better is not None)
     return " ".join([*sentences, *([f"New best known values on {better}."] if better else [])])
+
+
+def describe_unknown(comparison: Comparison) -> list[str]:
+    """Return a sentence for each solver with runs whose evaluations are unknown."""
+    unknown = {s.name: (sum(not r.evaluations for r in s.records), len(s.records)) for s in comparison.solvers}
+    return [
+        f"{name}: the number of evaluations of {count} of {runs} runs is unknown; all statistics of evaluations exclude {name}."
+        for name, (count, runs) in unknown.items()
+        if count
+    ]
+
+
+def describe_failures(comparison: Comparison) -> list[str]:
+    """Return a sentence for each solver with runs that have no result."""
+    sentences = []
+    for solver in comparison.solvers:
+        failed = [record for record in solver.records if not record.x]
+        if failed:
+            runs = f"{len(failed)} of {len(solver.records)} runs"
+            first = failed[0].status
+            sentences.append(f"{comparison.problem}, {solver.name}: {runs} have no result; the first {first}")
+    return sentences
+
+
+class LiveGaps:
+    """Median gap of each solver's finished runs, by problem."""
+
+    def __init__(self) -> None:
+        self._records: list[RunRecord] = []
+        self._known: dict[str, float | None] = {}  # best known objectives by problem
+
+    def add(self, record: RunRecord) -> str:
+        """Take a finished run, and return a line for each problem: ``nao-ssp: ipopt 0.0000 % (20), pso 0.33 % (7)``."""
+        self._records.append(record)
+        if record.problem not in self._known:
+            self._known[record.problem] = find_reference(record.inputs.problem).objective
+        groups = group_by(self._records, lambda run: run.problem).items()
+        return "\n".join(f"{problem}: {_list_gaps(runs, self._known[problem])}" for problem, runs in groups)
+
+
+def _list_gaps(records: Sequence[RunRecord], known: float | None) -> str:
+    objective, runs = records[0].inputs.objective, group_by(records, lambda record: record.solver)
+    reference = find_best_known(records) if known is None else known
+    gaps = {
+        solver: median(compute_gap(objective.sign * record.cost, reference, objective) for record in group)
+        for solver, group in runs.items()
+    }
+    best_first = sorted(gaps, key=lambda solver: (gaps[solver], solver))
+    percent = {solver: format_percent(gap if gap >= SMALLEST_GAP else 0.0) for solver, gap in gaps.items()}
+    return ", ".join(f"{solver} {percent[solver]} ({len(runs[solver])})" for solver in best_first)

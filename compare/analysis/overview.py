@@ -1,13 +1,11 @@
 """Solvers over many problems: mean ranks with Friedman's test and the critical difference, wins against others."""
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from compare.analysis.comparison import Comparison, index_solvers
-from compare.analysis.pairs import SIGNIFICANT, Pair
-from compare.analysis.record_statistics import tie
+from compare.analysis.record_statistics import SIGNIFICANT, tie
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,17 +57,11 @@ def rank_over_problems(comparisons: Sequence[Comparison]) -> Ranking:
 
 def count_wins(comparisons: Sequence[Comparison], solver: str) -> list[Score]:
     """Return how often a solver is significantly better or worse than each other one that has as many runs to test."""
-    tested: dict[str, list[Pair]] = {}
+    tested: dict[str, list[int]] = {}
     for comparison in comparisons:
-        for pair in comparison.pairs:
-            if solver in (pair.first, pair.second):
-                tested.setdefault(pair.second if pair.first == solver else pair.first, []).append(pair)
-    scores = []
-    for other, pairs in tested.items():
-        better = Counter(pair.first for pair in pairs if pair.is_significant)
-        wins, losses = better[solver], better[other]
-        scores.append(Score(other=other, wins=wins, ties=len(pairs) - wins - losses, losses=losses))
-    return scores
+        for other, result in comparison.compare_with_others(solver).items():
+            tested.setdefault(other, []).append(result)
+    return [Score(other=other, wins=r.count(1), ties=r.count(0), losses=r.count(-1)) for other, r in tested.items()]
 
 
 def list_user_solvers(comparisons: Sequence[Comparison]) -> list[str]:

@@ -6,6 +6,7 @@ Tests take costs to be minimised, infinite where a run found nothing feasible.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations, count
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 # Targets of the distribution: from 100 % above the best known to 1e-6, evenly in logarithm.
 ECDF_TARGETS: tuple[float, ...] = tuple(float(target) for target in np.logspace(0, -6, 31))
+SIGNIFICANT = 0.05  # p-values below it are a difference
 
 
 def list_weights(n: int) -> dict[str, float]:
@@ -59,7 +61,7 @@ class Curve:
 def make_curve(record: RunRecord, objective: Objective, reference: float) -> Curve:
     """Return the best so far of a run, with gaps from a reference objective; its end alone if its evaluations are unknown."""
     if not record.evaluations:
-        gap = compute_gap(record.verdict.objective, reference, objective) if record.verdict.feasible else math.inf
+        gap = compute_gap(objective.sign * record.cost, reference, objective)
         return Curve(evaluations=np.array([math.nan]), seconds=np.array([record.time_s.solve]), gap=np.array([gap]))
     evaluations = np.array(record.history.evaluations, dtype=float)
     if evaluations.size:  # derivatives are counted at the end
@@ -198,6 +200,52 @@ def compute_a12(a: Sequence[float], b: Sequence[float]) -> float:
     """
     first, second = np.asarray(a)[:, None], np.asarray(b)[None, :]
     return float(np.mean((first < second) + 0.5 * (first == second)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """Two solvers and the rank-sum test of their final costs."""
+
+    first: str  #: solver with the better median
+    second: str  #: the other
+    rank_sum: float  #: p-value over all runs of both, Holm-corrected over all pairs of the problem
+    a12: float  #: probability that a run of the first is better
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether the test finds a difference."""
+        return self.rank_sum < SIGNIFICANT
+
+
+def compare_pairs(costs: Mapping[str, Sequence[float]]) -> list[Pair]:
+    """Test every pair of solvers with at least two runs each, given with the best median first; infeasible costs are infinite."""
+    pairs = list(combinations([name for name, values in costs.items() if len(values) > 1], 2))
+    if not pairs:
+        return []
+    corrected = correct_by_holm([compute_rank_sum(costs[a], costs[b]) for a, b in pairs])
+    return [
+        Pair(first=a, second=b, rank_sum=float(p), a12=compute_a12(costs[a], costs[b]))
+        for (a, b), p in zip(pairs, corrected, strict=True)
+    ]
+
+
+def describe_power(runs: Sequence[int]) -> str:
+    """Say that too few runs of each solver allow no significant difference, and how many do; empty if they suffice."""
+    pairs = list(combinations([number for number in runs if number > 1], 2))
+    if not pairs:
+        return ""
+
+    def find_least(first: int, second: int) -> float:
+        return len(pairs) * compute_rank_sum(range(first), range(first, first + second))
+
+    least = min(find_least(*pair) for pair in pairs)
+    if least < SIGNIFICANT:
+        return ""
+    enough = next(number for number in count(2) if find_least(number, number) < SIGNIFICANT)
+    return (
+        f"with these numbers of runs and {len(pairs)} pair{'s' * (len(pairs) > 1)} of solvers, no difference can be significant: "
+        f"the least possible p-value is {min(least, 1.0):.2g}; {enough} runs of each solver allow one"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

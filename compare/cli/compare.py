@@ -11,9 +11,7 @@ from typer import Argument, Option
 
 from compare.analysis.columns import PRINTED, format_rows, summarise
 from compare.analysis.comparison import Comparison, compare_problems
-from compare.analysis.failures import describe_failures, describe_unknown
-from compare.analysis.headline import write_headlines
-from compare.analysis.live_gaps import LiveGaps
+from compare.analysis.headline import LiveGaps, describe_failures, describe_unknown, write_headlines
 from compare.analysis.tuning import tune_solvers
 from compare.analysis.units import with_unit
 from compare.cli import options

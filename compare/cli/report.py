@@ -6,7 +6,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from compare.analysis.comparison import compare_problems
-from compare.analysis.failures import describe_unknown
+from compare.analysis.headline import describe_unknown
 from compare.cli.command import OUTPUT, command, describe_stored
 from compare.cli.compare import list_excluded
 from compare.cli.options import Code, Scheduler, name_all

@@ -6,7 +6,7 @@ from statistics import mean, median, stdev
 
 from compare.analysis.comparison import SMALLEST_GAP, Comparison, index_solvers
 from compare.analysis.overview import count_wins, list_user_solvers, rank_over_problems
-from compare.analysis.pairs import SIGNIFICANT
+from compare.analysis.record_statistics import SIGNIFICANT
 from compare.analysis.units import join_words, make_heading, with_unit
 from nlp_gait.files import make_file_name
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
@@ -16,6 +16,11 @@ SPECIAL = str.maketrans(
     {c: rf"\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}", "\\": r"\textbackslash{}"}
 )
 UNKNOWN = "--"
+MARKS = {
+    1: "$+$",
+    0: "$=$",
+    -1: "$-$",
+}  # of a solver that the subject is better than, not different from, or worse than
 LEAST_DECIMALS, MOST_DECIMALS = 4, 10
 
 
@@ -52,11 +57,7 @@ def format_latex_overview(comparisons: Sequence[Comparison]) -> str:
     subject = [*list_user_solvers(comparisons), *names][0]
     rows = []
     for comparison, solvers in zip(comparisons, by_name, strict=True):
-        marks = {
-            pair.second if pair.first == subject else pair.first: _mark(pair.first == subject, pair.is_significant)
-            for pair in comparison.pairs
-            if subject in (pair.first, pair.second)
-        }
+        marks = {name: MARKS[result] for name, result in comparison.compare_with_others(subject).items()}
         cells = [
             f"{_format_gap(comparison.gap(solvers[name].median_cost))} {marks.get(name, '')}".strip()
             if name in solvers
@@ -74,10 +75,6 @@ def format_latex_overview(comparisons: Sequence[Comparison]) -> str:
     )
     text = escape_latex(caption).replace(r"\$", "$")
     return _format_table(text, "problems", ("problem", *map(escape_latex, names)), rows)
-
-
-def _mark(is_better: bool, is_significant: bool) -> str:
-    return ("$+$" if is_better else "$-$") if is_significant else "$=$"
 
 
 def _format_table(caption: str, label: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -6,7 +6,7 @@ from functools import partial
 
 from compare.analysis.columns import EFFORT, EVALUATIONS_TO, JUDGEMENT, MAIN, SECONDS_TO, Column, format_rows
 from compare.analysis.comparison import Comparison
-from compare.analysis.failures import describe_unknown
+from compare.analysis.headline import describe_unknown
 from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers, rank_over_problems
 from compare.analysis.record_statistics import list_weights
 from compare.analysis.units import BY_UNIT

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from compare.analysis.best_known import compute_gap
-from compare.analysis.pairs import describe_power
 from compare.analysis.record_statistics import (
     Curve,
     approximate_rank_sum,
@@ -20,6 +19,7 @@ from compare.analysis.record_statistics import (
     compute_running_time,
     correct_by_holm,
     count_equivalent,
+    describe_power,
     find_best_known,
     make_curve,
 )

@@ -11,7 +11,7 @@ import pytest
 
 from compare.analysis.columns import ALL, format_rows
 from compare.analysis.comparison import compare_problems
-from compare.analysis.failures import describe_unknown
+from compare.analysis.headline import describe_unknown
 from compare.judge import evaluate
 from compare.study.import_runs import import_runs, read_imported_records, read_points
 from compare.study.record_files import read_records, write_records
