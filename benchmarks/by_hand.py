@@ -10,7 +10,7 @@ import pinocchio as pin
 
 import nlp_gait
 from benchmarks.rows import Array
-from nlp_gait.gaits.nao.body import GRAVITY, load_nao
+from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import TreeBody, make_tree
@@ -54,7 +54,7 @@ class ByHand:
     def __init__(self) -> None:
         self.problem = nlp_gait.load("nao-ssp", derivatives="finite-difference")
         self.names, self.lower, self.upper = self.problem.names, self.problem.lower, self.problem.upper
-        self.robot = load_nao("nao-v5")
+        self.robot = make_nao("nao-v5").robot
         self.model, self.places = pinocchio_model(self.robot)
         self.data = self.model.createData()
         self.phase = np.linspace(0.0, 1.0, 11)

@@ -22,7 +22,7 @@ from nlp_gait.backends.kernel.compiled import SHARED, NativeRows
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
 from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel, write_rows_source
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.nao.body import GRAVITY, find_upright_links, load_nao
+from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import make_tree
@@ -103,10 +103,11 @@ def _with_violation(kernel: Kernel, problem: GaitProblem) -> Function:
 
 def torques(rounds: int) -> list[Row]:
     """Inverse dynamics alone, samples one by one: every joint free, and as the gait moves them."""
-    robot = load_nao("nao-v5")
+    body = make_nao("nao-v5")
+    robot = body.robot
     moving = [name for name in JOINTS if name in PLANNED_JOINTS or name in ARM_SWING]
     free = _torques(rounds, robot, JOINTS, ())
-    gait = _torques(rounds, robot, moving, find_upright_links(robot))
+    gait = _torques(rounds, robot, moving, body.upright)
     return [
         Row(name="torques alone, against pin.rneaInParallel(1)", unit="x", required=12, ambition=25, **gait),
         Row(name="torques alone, all 22 joints free", unit="x", **free),

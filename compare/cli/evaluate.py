@@ -22,7 +22,6 @@ from nlp_gait.export.formats import write_npz
 from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.files import format_csv, write_text
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.capabilities import RECORDED_GAITS, resolve
 from nlp_gait.robots import load_robot
 
 if TYPE_CHECKING:
@@ -113,10 +112,11 @@ def _evaluate_rounded(problem: GaitProblem, x: str, claimed: str | None) -> Outp
 
 def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) -> RecordedGait:
     """Read a gait from joint angles, with changed limits; InputError for a file without a gait, or an option without effect."""
+    from nlp_gait.gaits.nao.recorded import GAITS, make_recorded_gait
+
     robot, values = problem.robot or "nao-v5", dict(parse_pairs(problem.values, "--set"))
-    intervals = values.pop("intervals", None)
-    name = problem.name or next(iter(RECORDED_GAITS))
-    gait: RecordedGait = resolve(RECORDED_GAITS, name)(
+    intervals, name = values.pop("intervals", None), problem.name or GAITS[0]
+    gait = make_recorded_gait(
         read_joint_angles(motion, load_robot(robot)),
         robot=robot,
         gait=problem.name,

@@ -18,7 +18,6 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.gaits.biped.curves import SPANS
-from nlp_gait.gaits.capabilities import FITTED_STARTS, resolve
 from nlp_gait.symbolic.trajectories import refine_spline
 
 CONSTANT = 1e-4  # share of its range by which a variable may move and is shown as constant
@@ -37,6 +36,7 @@ class Variant:
 
 
 PROBLEM = "problem"  # in the text of a variant, names another problem
+FREE = "-free"  # ends the names of problems with free joints
 
 # The features of ``nlp_gait.gaits.biped.motors``; the first variant is the paper's.
 MOTORS = tuple(
@@ -68,7 +68,7 @@ def list_trajectories(problem: GaitProblem) -> tuple[Variant, ...]:
         }
         return Variant(name=name, options=changed, alone=True)
 
-    free = f"{problem.name}-free"
+    free = problem.name + FREE
     return (
         *(replace(make(order, order), alone=False) for order in ORDERS),
         make(f"{ORDERS[-1]}, few samples", ORDERS[-1], 1),
@@ -176,10 +176,11 @@ class Variants(Question[tuple[SolvedVariant, ...]]):
             x = convert_motion(solution.x, problem)
             if x is not None:
                 return solution.name, np.clip(x, problem.lower, problem.upper)
-        if feasible and problem.name in FITTED_STARTS:
+        if feasible and problem.name.endswith(FREE):
+            from nlp_gait.gaits.nao.free_joints import fit_joints
+
             planned = load_variant(self.problem, variants[feasible[0].name])
-            fit = resolve(FITTED_STARTS, problem.name)
-            x = fit(problem.options["trajectory"], planned, planned.check_x(feasible[0].x))
+            x = fit_joints(str(problem.options["trajectory"]), planned, planned.check_x(feasible[0].x))
             return feasible[0].name, np.clip(x, problem.lower, problem.upper)
         return "", None
 

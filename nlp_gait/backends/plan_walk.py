@@ -26,11 +26,10 @@ from nlp_gait.gaits.biped.support_phases import compute_sole_margins
 from nlp_gait.gaits.biped.walk_sections import GREATEST_SPEED, HALF_STEPS, LEAST_SPEED, start_from_cycle
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.gaits.humanoid.turning import list_turn
-from nlp_gait.gaits.nao.body import load_nao, make_nao
+from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.robots.loading import hold_robots
 
-NAO_WALK = "nao-walk"
 AT_BOUND = 1e-4  # share of a variable's range
 # Default least margins of the ZMP in a plan, along and across, as shares of a sole's length and width; chosen by energy against
 # the push survived, see ``benchmarks/humanoids.py``.
@@ -161,7 +160,8 @@ def plan_walk(
     Raises InputError for a number that is not allowed or does not fit the others; GaitError for a robot that cannot walk.
     """
     _check_positive(speed_m_s=speed_m_s, distance_m=distance_m)
-    walk = find_walk(robot)
+    body = make_body(robot)
+    walk = f"{body.family}-walk"
     count = 10 if steps is None else check_count("steps", steps, at_least=HALF_STEPS)
     problem = load(walk, robot=robot, steps=count, slope_deg=slope_deg, **settings.options)
     if steps is None and distance_m is not None:
@@ -171,7 +171,7 @@ def plan_walk(
     problem = _fix_speed(settings.apply(problem), speed_m_s)
     if distance_m is not None:
         problem = _fix_step(problem, distance_m)
-    cycle = None if walk == NAO_WALK else _load_cycle(problem, None)
+    cycle = None if body.closed_form else _load_cycle(problem, None)
     return _solve(problem, cycle, settings)
 
 
@@ -223,8 +223,7 @@ def plan_route(
     _check_positive(distance_m=distance_m)
     if footholds is not None and (turn_deg, steps, distance_m) != (0.0, None, None):
         raise InputError("footholds determine steps, distance and turn; leave out steps, distance and turn")
-    walk = find_walk(robot)
-    body: Body = make_nao(robot) if walk == NAO_WALK else make_humanoid(robot)
+    body = make_body(robot)
     if steps is None and len(speeds_m_s):
         steps = len(speeds_m_s) + HALF_STEPS
     if footholds is not None:
@@ -235,12 +234,7 @@ def plan_route(
         count = check_count("steps", steps or 10, at_least=HALF_STEPS)
         text = list_arc(turn_deg, count, distance_m or body.step_length_m * (count - 1), body.feet_y)
     places = parse_footholds(text)
-    if walk == NAO_WALK and any(place.yaw for place in places):
-        raise InputError(
-            f"robot {robot!r} does not turn: NAO has one motor for both hip yaw-pitch joints, so that no foot turns alone; "
-            "turns are planned for legs whose hip joints turn one by one"
-        )
-    problem = load(walk, robot=robot, steps=len(places), footholds=text, **settings.options)
+    problem = load(f"{body.family}-walk", robot=robot, steps=len(places), footholds=text, **settings.options)
     problem = settings.apply(problem.with_values(**list_speeds(speeds_m_s, len(places))))
     swings = list_swings(places, body.feet_y)
     step_m = sum(landed.x for _, landed in swings) / max(len(swings) - 1, 1)
@@ -268,13 +262,12 @@ def _check_positive(**values: float | None) -> None:
             raise InputError(f"{name} must be a finite number > 0, got {value!r}")
 
 
-def find_walk(robot: str) -> str:
-    """Return the name of the walk's problem: NAO's for robots of its build."""
+def make_body(robot: str) -> Body:
+    """Return a robot as its walks take it: with closed-form legs where they fit, or any humanoid."""
     try:
-        load_nao(robot)
+        return make_nao(robot)
     except InputError:
-        return "humanoid-walk"
-    return NAO_WALK
+        return make_humanoid(robot)
 
 
 def _fix_speed(problem: GaitProblem, speed_m_s: float | None) -> GaitProblem:

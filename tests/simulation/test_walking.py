@@ -6,7 +6,7 @@ import pytest
 import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, Signals, sample_finely
-from nlp_gait.gaits.nao.body import GRAVITY, load_nao
+from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.gaits.several_steps import measure_step, repeat_steps
 from nlp_gait.robots import load_robot
 from tests.pinocchio_oracle import left_over
@@ -51,7 +51,7 @@ def jumps(values: Array, slopes: Array, t: Array) -> Array:
 
 
 def test_a_walk_has_no_jump_in_any_angle_or_position(signals: Signals) -> None:
-    arrays = repeat_steps(signals, load_nao("nao-v5"), 4).arrays
+    arrays = repeat_steps(signals, make_nao("nao-v5").robot, 4).arrays
     t = arrays["t"]
     assert (np.diff(t) > 0.0).all()
     assert t[-1] == pytest.approx(4 * signals.arrays["t"][-1])
@@ -61,7 +61,7 @@ def test_a_walk_has_no_jump_in_any_angle_or_position(signals: Signals) -> None:
 
 
 def test_every_second_step_is_a_mirror_image_and_two_of_them_move_alike(signals: Signals) -> None:
-    arrays = repeat_steps(signals, load_nao("nao-v5"), 3).arrays
+    arrays = repeat_steps(signals, make_nao("nao-v5").robot, 3).arrays
     n, step = len(signals.arrays["t"]) - 1, measure_step(signals)
     assert step == pytest.approx(0.07619)
     np.testing.assert_allclose(arrays["q"][2 * n :], arrays["q"][: n + 1], atol=CONTINUITY)
@@ -72,7 +72,7 @@ def test_every_second_step_is_a_mirror_image_and_two_of_them_move_alike(signals:
 
 def test_wrenches_carry_the_robot_in_mirrored_steps_too(signals: Signals) -> None:
     """Pinocchio finds nothing left over in either phase of the second and the third step."""
-    walked = repeat_steps(signals, load_nao("nao-v5"), 3)
+    walked = repeat_steps(signals, make_nao("nao-v5").robot, 3)
     n = len(signals.arrays["t"]) - 1
     for sample in (n + n // 4, n + n // 2, 2 * n - n // 8, 2 * n + n // 2, 3 * n - n // 8):
         loads = [walked.arrays[f"{side}_force"][sample, 2] for side in ("left", "right")]
@@ -119,4 +119,4 @@ def test_feet_stand_when_they_are_planned_to(cycle: Result) -> None:
 @pytest.mark.parametrize("steps", [0, -1, True, 1.0])
 def test_a_wrong_number_of_steps_is_refused(signals: Signals, steps: int) -> None:
     with pytest.raises(InputError, match="steps must be a whole number >= 1"):
-        repeat_steps(signals, load_nao("nao-v5"), steps)
+        repeat_steps(signals, make_nao("nao-v5").robot, steps)

@@ -16,6 +16,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Parameter, Variable
 from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory
+from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Box, Limit, Margins, compute_margins
 from nlp_gait.gaits.biped.motors import Motors
@@ -63,6 +64,7 @@ def read_duration(point: InstantPoint, phase: Support) -> SX:
 # torso and of the right foot, from the left one's.
 Angles: TypeAlias = Mapping[str, Motion]
 TORSO_YAW, RIGHT_YAW = "torso_yaw", "right_yaw"
+LEAN = ("torso_roll", "torso_pitch")  # to either side, back and forward
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -223,6 +225,10 @@ class Body(ABC):
         foot = self.robot.feet["left"]
         sole = Box(back=-foot.back_m, front=foot.front_m, right=-foot.right_m, left=foot.left_m)
         return lambda zmp, point, ops: compute_margins(sole, zmp - ca.repmat(DM(support_xy), 1, zmp.shape[1]), ops)
+
+    @abstractmethod
+    def check_footholds(self, footholds: Sequence[Foothold]) -> None:
+        """Raise InputError if the robot cannot step along footholds, the right foot's first, for its build alone."""
 
     def make_curve_limits(self, phase: Support, count: int) -> tuple[Limit, ...]:
         """Return the limits that cubics cannot break but splines of ``count`` coefficients can; none without splines."""

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -10,15 +10,14 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.formulation import Array, Assembly, Display, GaitProblem, Grid, Signals, SolverHints, Start
+from nlp_gait.formulation import Array, Assembly, GaitProblem, Grid, Signals, SolverHints, Start
 from nlp_gait.formulation.assembly import Objective, Parameter, Point, Variable, make_parameters
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import TIMES, Body, Support
-from nlp_gait.gaits.biped.bounds import make_usual_bounds
 from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, make_cycle_planners, make_cycle_variables
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import BalanceMargins, Box, compute_margins, make_rows
-from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase, make_start_within_reach
+from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase, make_start_within_reach
 from nlp_gait.gaits.biped.samples import Loader
 from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, MotionSection, Sequence
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
@@ -44,7 +43,7 @@ class WalkingCycle(Sequence):
     @property
     def objective(self) -> Objective:
         """What is minimised."""
-        return self.phases[Support.SINGLE].goal.objective if self.at_given_speed else ENERGY_PER_METRE
+        return self.phases[Support.SINGLE].objective if self.at_given_speed else ENERGY_PER_METRE
 
     @property
     def decisions(self) -> tuple[Variable, ...]:
@@ -150,13 +149,8 @@ def make_cycle_margins(body: Body) -> dict[Support, BalanceMargins]:
     return {Support.SINGLE: limit_to_sole(body, (0.0, left_y)), Support.DOUBLE: limit_to_box(usual, double)}
 
 
-def plan_cycle(
-    body: Body, grid: Grid, objective: CycleObjective, loads: Loader, touch_down: Switch = SOFT_LANDING
-) -> GaitProblem:
-    """Return the problem of a walking cycle; for the objective and the touch-down see ``CycleOptions``."""
-    at_given_speed = objective != "energy-per-metre"
-    goal = make_goal(body, "torque" if objective == "torque" else "power")
-    cycle = make_walking_cycle(body, loads, grid, goal, at_given_speed=at_given_speed, touch_down=touch_down)
+def make_cycle_problem(cycle: WalkingCycle) -> GaitProblem:
+    """Return the problem of a walking cycle."""
     names = tuple(variable.name for variable in cycle.decisions)
 
     def reach(point: Point) -> MX:
@@ -164,31 +158,13 @@ def plan_cycle(
             *(cycle.phases[p.kind].sample(cycle.read_section(p, point), Exact()).reach for p in cycle.sections)
         )
 
-    start: Start = partial(draw_start, names, touch_down)
-    if not body.closed_form:
-        usual = [make_usual_bounds(body, variable) for variable in cycle.decisions]
-        start = make_start_within_reach(usual, (SPEED,) if at_given_speed else (), reach, start)
-    return make_cycle_problem(f"{body.family}-cycle", cycle, start, rows_over_time=body.closed_form, repeats=True)
-
-
-def make_cycle_problem(
-    name: str, cycle: WalkingCycle, start: Start | None = None, *, rows_over_time: bool, repeats: bool
-) -> GaitProblem:
-    """Return the problem of a cycle, perhaps with rows between samples; ``repeats``: a gait's mirror image is the next step."""
-    problem = GaitProblem(
-        name=name,
-        title=f"{cycle.body.title}, walking cycle: least {cycle.objective.name.replace('_', ' ')}",
-        variables=cycle.decisions,
-        own_parameters=cycle.parameters,
-        objective=cycle.objective,
-        with_other_options={} if cycle.at_given_speed else {SPEED: "objective=power"},
-        assemble=cycle.assemble,
-        grid=cycle.phases[Support.SINGLE].grid,
-        rows_over_time=cycle.rows_over_time if rows_over_time else (),
-        display=Display(motion=cycle.signals, durations=tuple(TIMES.values())),
-        hints=SolverHints(start=start),
-    )
-    return add_robot(problem, cycle.body, repeats=repeats)
+    uniform = not cycle.at_given_speed and cycle.touch_down == SOFT_LANDING
+    start: Start | None = None if uniform else partial(draw_start, names, cycle.touch_down)
+    if not cycle.body.closed_form:
+        start = make_start_within_reach(cycle, (SPEED,) if cycle.at_given_speed else (), reach, start)
+    title = f"walking cycle: least {cycle.objective.name.replace('_', ' ')}"
+    problem = make_gait_problem(cycle, "cycle", title, SolverHints(start=start), repeats=True)
+    return problem if cycle.at_given_speed else replace(problem, with_other_options={SPEED: "objective=power"})
 
 
 def draw_start(

@@ -16,6 +16,7 @@ from nlp_gait.formulation import (
     Grid,
     InstantPoint,
     NumericPoint,
+    Objective,
     Parameter,
     Signals,
     make_vector_columns,
@@ -80,6 +81,21 @@ class Phase:
     standing: tuple[str, ...] = ("L", "R")  # sides of the feet on the ground
     kinks: tuple[float, ...] = ()  # phases at which the motion's formula changes: knots of splines
     start: Start | None = None  # start points; None for any within the bounds
+
+    @property
+    def decisions(self) -> tuple[Variable, ...]:
+        """Variables of the problem, in the order of x."""
+        return self.variables
+
+    @property
+    def objective(self) -> Objective:
+        """What is minimised."""
+        return self.goal.objective
+
+    @property
+    def durations(self) -> tuple[str, ...]:
+        """Variables of the durations, in the order of time."""
+        return (self.duration,)
 
     @property
     def every_limit(self) -> tuple[Limit, ...]:

@@ -1,6 +1,6 @@
 """The problem of a phase: its goal, its limits, its start points, and its robot for drawings and simulations."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Any, Literal
@@ -10,8 +10,8 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, GaitProblem, NumericPoint, Point, Signals, SolverHints, Start, Variable
-from nlp_gait.formulation.display import Display, SimulationModel, Skeleton, Tread
+from nlp_gait.formulation import Array, GaitProblem, Point, Signals, SolverHints, Start
+from nlp_gait.formulation.display import Display, SimulationModel, Skeleton
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import Body, Support
@@ -20,6 +20,7 @@ from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
 from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Loader
+from nlp_gait.gaits.biped.sequence import Sequence
 from nlp_gait.gaits.biped.skeleton import draw_robot
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -43,13 +44,13 @@ def make_goal(body: Body, criterion: Criterion) -> Goal:
     return Goal(heat=heat) if motors.power is None else Goal(heat=heat, power=motors.power)
 
 
-def make_phase_limits(body: Body, balance: limits.BalanceMargins, *, solved: bool = True) -> tuple[limits.Limit, ...]:
-    """Return the limits of every phase (sections 4.1 and 4.2) and of the drives; ``solved``: angles follow from the feet."""
+def make_phase_limits(body: Body, balance: limits.BalanceMargins) -> tuple[limits.Limit, ...]:
+    """Return the limits of every phase (sections 4.1 and 4.2) and of the drives."""
     size = body.torque_scale
     return (
         limits.JointLimits(body.robot, body.planned),
         limits.Reach(),
-        *((limits.Closure(),) if solved and not body.closed_form else ()),
+        *(() if body.closed_form else (limits.Closure(),)),
         limits.TorqueChange(size),
         *((limits.DriveLimits(body.robot, size),) if body.drive_limits else ()),
         balance,
@@ -61,7 +62,7 @@ def make_phase(
     kind: Support,
     balance: limits.BalanceMargins,
     loads: Loader | None,
-    added_limits: Sequence[limits.Limit] = (),
+    added_limits: tuple[limits.Limit, ...] = (),
     **fields: Any,
 ) -> Phase:
     """Return a phase of a kind with the usual limits, others, and further fields; ``loads`` are those of double support."""
@@ -76,60 +77,60 @@ def make_phase(
 
 def make_phase_problem(name: str, title: str, phase: Phase, *, searchable: bool = True) -> GaitProblem:
     """Return the problem of one phase, whose name and title lack the robot's; not ``searchable``, it needs gradients."""
-    body, start = phase.body, phase.start
-    if not body.closed_form:
-        usual = [make_usual_bounds(body, variable) for variable in phase.variables]
-        start = make_start_within_reach(usual, (), lambda point: phase.sample(point, Exact()).reach, start)
-    problem = GaitProblem(
-        name=f"{body.family}-{name}",
-        title=f"{body.title}, {title}",
-        variables=phase.variables,
-        own_parameters=phase.parameters,
-        objective=phase.goal.objective,
-        assemble=phase.assemble,
-        grid=phase.grid,
-        rows_over_time=phase.rows_over_time() if body.closed_form else (),
-        display=Display(motion=phase.signals, durations=(phase.duration,)),
-        hints=SolverHints(start=start, searchable=searchable),
-    )
-    return add_robot(problem, body)
+    start = phase.start
+    if not phase.body.closed_form:
+        start = make_start_within_reach(phase, (), lambda point: phase.sample(point, Exact()).reach, start)
+    return make_gait_problem(phase, name, title, SolverHints(start=start, searchable=searchable))
 
 
-def add_robot(
-    problem: GaitProblem,
-    body: Body,
-    *,
-    repeats: bool = False,
-    steps: int | None = None,
-    ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None,
+def make_gait_problem(
+    gait: Phase | Sequence, name: str, title: str, hints: SolverHints, **simulated: Any
 ) -> GaitProblem:
-    """Return the problem with its robot for drawings and simulations; ``repeats``: a gait's mirror image is the next step."""
-    simulated = replace(body.simulated, armatures_kgm2=body.robot.armatures_kgm2)
-    model = SimulationModel(
-        robot=simulated,
-        gravity=body.gravity,
-        slope_rad=body.slope_rad,
-        heat_loss=HEAT_LOSS.name,
-        repeats=repeats,
-        steps=steps,
-        ground=ground,
-    )
+    """Return the problem of a phase or a sequence of phases, whose name and title lack the robot's.
+
+    ``simulated`` are fields of the model for simulations that are not the robot's.
+    """
+    body = gait.body
 
     def draw(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
         return draw_robot(body.full, signals)
 
-    display = replace(problem.display, robot=body.full, skeleton=draw, simulation_model=model)
-    return replace(problem, display=display)
+    model = SimulationModel(
+        robot=replace(body.simulated, armatures_kgm2=body.robot.armatures_kgm2),
+        gravity=body.gravity,
+        slope_rad=body.slope_rad,
+        heat_loss=HEAT_LOSS.name,
+        **simulated,
+    )
+    return GaitProblem(
+        name=f"{body.family}-{name}",
+        title=f"{body.title}, {title}",
+        variables=gait.decisions,
+        own_parameters=gait.parameters,
+        objective=gait.objective,
+        assemble=gait.assemble,
+        grid=gait.grid,
+        rows_over_time=gait.rows_over_time() if body.closed_form else (),
+        display=Display(
+            motion=gait.signals,
+            durations=gait.durations,
+            robot=body.full,
+            skeleton=draw,
+            simulation_model=model,
+        ),
+        hints=hints,
+    )
 
 
 def make_start_within_reach(
-    variables: Sequence[Variable], names_read: Sequence[str], reach: Callable[[Point], MX], start: Start | None
+    gait: Phase | Sequence, names_read: tuple[str, ...], reach: Callable[[Point], MX], start: Start | None
 ) -> Start:
     """Return start points at which all knees are within reach, or the nearest of some: beyond reach there is no slope back.
 
     Besides the margin on the reach, the motion reads the parameters ``names_read``; ``reach`` gives the cosines of the knees at a
-    point. Start points to choose from are those of ``start``, or any, within both the bounds and those of ``variables``.
+    point. Start points to choose from are those of ``start``, or any, within both the bounds and the usual ones.
     """
+    variables = [make_usual_bounds(gait.body, variable) for variable in gait.decisions]
     read = (limits.REACH_MARGIN, *names_read)
     names = [variable.name for variable in variables]
 

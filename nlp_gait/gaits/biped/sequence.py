@@ -1,5 +1,6 @@
 """Motions of several phases, such as a cycle or a walk: their phases as data, the joints between these, and all of their rows."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -9,7 +10,17 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.formulation import Assembly, Constraint, Objective, Parameter, Point, RowsOverTime, Signals, Variable
+from nlp_gait.formulation import (
+    Assembly,
+    Constraint,
+    Grid,
+    Objective,
+    Parameter,
+    Point,
+    RowsOverTime,
+    Signals,
+    Variable,
+)
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Samples
@@ -61,13 +72,46 @@ class AssembledSections(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sequence:
+class Sequence(ABC):
     """A motion of several phases, each distinct one sampled once."""
 
     body: Body
     variables: tuple[Variable, ...]
     phases: Mapping[Support, Phase]  # by kind
     sections: tuple[MotionSection, ...]  # in the order of time
+
+    @property
+    def decisions(self) -> tuple[Variable, ...]:
+        """Variables of the problem, in the order of x."""
+        return self.variables
+
+    @property
+    def objective(self) -> Objective:
+        """What is minimised."""
+        return ENERGY_PER_METRE
+
+    @property
+    @abstractmethod
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of all phases and of the sequence."""
+
+    @property
+    def grid(self) -> Grid:
+        """Samples of each phase."""
+        return self.phases[Support.SINGLE].grid
+
+    @property
+    def durations(self) -> tuple[str, ...]:
+        """Variables of the durations, in the order of time."""
+        return tuple(section.duration for section in self.sections for _ in range(section.occurs))
+
+    @abstractmethod
+    def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
+        """Return objective, rows and indexes."""
+
+    @abstractmethod
+    def signals(self, point: Any) -> Signals:
+        """Return time histories at a point of numbers."""
 
     def read_section(self, section: MotionSection, point: Any) -> Any:
         """Return the point of a section's phase from that of the motion."""
@@ -126,9 +170,8 @@ class Sequence:
             indexes={f"{section.name}_{key}": value for key, value in assembly.indexes.items()},
         )
 
-    @property
     def rows_over_time(self) -> tuple[RowsOverTime, ...]:
-        """Each section as functions of time, where it occurs first."""
+        """Return each section as functions of time, where it occurs first."""
 
         def assemble(section: MotionSection, whole: Point, instants: MX, ops: Nonsmooth) -> Assembly:
             point = self.read_section(section, whole)

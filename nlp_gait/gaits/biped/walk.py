@@ -19,7 +19,6 @@ from nlp_gait.formulation import (
     Array,
     Assembly,
     Constraint,
-    Display,
     GaitProblem,
     Grid,
     Point,
@@ -38,9 +37,9 @@ from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.limits import RowsAndIndexes
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase
+from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_goal, make_phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
-from nlp_gait.gaits.biped.sequence import CYCLE, ENERGY_PER_METRE, End, MotionSection, Sequence
+from nlp_gait.gaits.biped.sequence import CYCLE, End, MotionSection, Sequence
 from nlp_gait.gaits.biped.support_phases import limit_to_box, make_support_box
 from nlp_gait.gaits.biped.switch import read_state
 from nlp_gait.gaits.biped.walk_sections import (
@@ -235,19 +234,7 @@ def make_walk_problem(
     ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None,
 ) -> GaitProblem:
     """Return the problem of a walk; start points are shares of the bounds of the variables ``started``."""
-    body = walk.body
-    durations = tuple(section.duration for section in walk.sections for _ in range(section.occurs))
-    start = make_walk_start(body, started, walk.states, walk.sections)
-    problem = GaitProblem(
-        name=f"{body.family}-walk",
-        title=f"{body.title}, walk from standing to standing: least energy per metre",
-        variables=walk.variables,
-        own_parameters=walk.parameters,
-        objective=ENERGY_PER_METRE,
-        assemble=walk.assemble,
-        grid=walk.phases[Support.SINGLE].grid,
-        rows_over_time=walk.rows_over_time if body.closed_form else (),
-        display=Display(motion=walk.signals, durations=durations),
-        hints=SolverHints(start=start, starts=3, searchable=False),
-    )
-    return add_robot(problem, body, steps=walk.steps, ground=ground)
+    start = make_walk_start(walk.body, started, walk.states, walk.sections)
+    hints = SolverHints(start=start, starts=3, searchable=False)
+    title = "walk from standing to standing: least energy per metre"
+    return make_gait_problem(walk, "walk", title, hints, steps=walk.steps, ground=ground)

@@ -4,19 +4,20 @@ To add a joint between a cycle's phases, write a ``Switch`` (``impact.py`` is on
 the object in ``LANDINGS``, and words to the attribute ``landing``. Both families of problems then have it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.biped.body import Body
-from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
+from nlp_gait.gaits.biped.cycle import CycleObjective, make_cycle_problem, make_walking_cycle
 from nlp_gait.gaits.biped.flight import Flight
-from nlp_gait.gaits.biped.footholds import Foothold, parse_footholds
+from nlp_gait.gaits.biped.footholds import parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.impact import Impact
 from nlp_gait.gaits.biped.loads import make_divided_loads
+from nlp_gait.gaits.biped.phase_problem import make_goal
 from nlp_gait.gaits.biped.problems import LoadOptions, SampleOptions
 from nlp_gait.gaits.biped.switch import SOFT_LANDING, Switch
 from nlp_gait.gaits.biped.walk import plan_whole_walk
@@ -56,21 +57,27 @@ class WalkOptions(SampleOptions):
     footholds: str = ""
 
 
-def make_cycle_problem(body: Body, options: CycleOptions) -> GaitProblem:
+def plan_cycle(body: Body, options: CycleOptions) -> GaitProblem:
     """Return the problem of a cycle."""
-    loads = make_divided_loads(body, options.torso_share)
-    return plan_cycle(body, options.make_grid(), options.objective, loads, LANDINGS[options.landing])
+    goal = make_goal(body, "torque" if options.objective == "torque" else "power")
+    cycle = make_walking_cycle(
+        body,
+        make_divided_loads(body, options.torso_share),
+        options.make_grid(),
+        goal,
+        at_given_speed=options.objective != "energy-per-metre",
+        touch_down=LANDINGS[options.landing],
+    )
+    return make_cycle_problem(cycle)
 
 
-def make_walk_problem(
-    body: Body, options: WalkOptions, check: Callable[[Sequence[Foothold]], None], flight: Flight | None = None
-) -> GaitProblem:
-    """Return the problem of a whole walk, on a slope, up a flight of stairs or along footholds, which ``check`` may refuse."""
+def plan_walk(body: Body, options: WalkOptions, flight: Flight | None = None) -> GaitProblem:
+    """Return the problem of a whole walk, on a slope, up a flight of stairs or along footholds; raises InputError."""
     body, grid = body.tilt_ground(options.slope_deg), options.make_grid()
     if not options.footholds:
         return plan_whole_walk(body, options.steps, grid, flight)
     if options.slope_deg or flight:
         raise InputError("footholds are on a level floor; leave out slope_deg and the sizes of stairs")
     places = parse_footholds(options.footholds)
-    check(places)
+    body.check_footholds(places)
     return plan_footstep_walk(body, places, options.steps, grid)

@@ -1,5 +1,6 @@
 """Any humanoid as its gaits take it: sizes that scale NAO's bounds and limits, and legs under a torso that leans."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -12,7 +13,8 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Variable
 from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
 from nlp_gait.formulation.assembly import make_variables
-from nlp_gait.gaits.biped.body import RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, Support
+from nlp_gait.gaits.biped.body import LEAN, RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, Support
+from nlp_gait.gaits.biped.footholds import Foothold, list_swings, meets
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM
 from nlp_gait.gaits.biped.motors import Motors, parse_features
@@ -28,7 +30,7 @@ from nlp_gait.symbolic.trajectories import Motion, constant_motion
 # Heights of the hip's middle above the ankles, as shares of a leg's length. The least is the paper's; the greatest is more than
 # its 0.886, with which ankles of other robots reach their limits.
 HEIGHT_SHARES = (0.5905, 0.95)
-LEAN = ("torso_roll", "torso_pitch")  # lean of the torso: roll to either side, pitch back and forward [rad]
+UPRIGHT = 0.9  # vertical component of the axis of a joint that turns a leg
 LARGEST_LEAN = dict(zip(LEAN, (0.15, 0.3), strict=True))
 LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
 # Nearly all poses are closed to this [1, rad] before the last Newton step, which squares the rest.
@@ -63,6 +65,22 @@ class Humanoid(Body):
 
     def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:
         return dict(zip(LEAN, coordinates, strict=True))
+
+    def check_footholds(self, footholds: Sequence[Foothold]) -> None:
+        """Raise InputError if hip joints do not allow the angle between two footholds, or a swinging sole meets the other one."""
+        if stop := self.find_turn_stop(footholds):
+            raise InputError(f"{stop}; take more steps, turn by smaller angles, or place the feet further apart")
+
+    def find_turn_stop(self, footholds: Sequence[Foothold]) -> str | None:
+        """Return what does not allow the first step that hip joints or soles do not allow, in words; None if all are allowed."""
+        standing = Foothold(0.0, self.feet_y[0], 0.0).outline(self.robot.feet["left"])
+        for k, (lifted, landed) in enumerate(list_swings(footholds, self.feet_y), 1):
+            if stiff := find_stiff_joint(self.biped, landed.yaw):
+                turned, allowed = (math.degrees(angle) for angle in (abs(landed.yaw), stiff[1]))
+                return f"step {k} turns by {turned:.3g} degrees, and the limits of {stiff[0]} allow {allowed:.3g}"
+            if meets(standing, self.robot.feet["right"], lifted, landed):
+                return f"in step {k} the swinging sole passes over the standing one"
+        return None
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
         """Return the motion of the whole robot; the torso rolls about its own x axis, pitches before that and yaws first."""
@@ -107,6 +125,17 @@ class Humanoid(Body):
             attitude=ca.vertcat(*attitude),
             yaw=angles[RIGHT_YAW].position if TORSO_YAW in angles else SX(0, 1),
         )
+
+
+def find_stiff_joint(biped: Biped, yaw: float) -> tuple[str, float] | None:
+    """Return the hip joint that forbids a yaw between the feet [rad], of which each leg turns half, and the largest allowed."""
+    for side, leg in biped.legs.items():
+        turn = (yaw if side == "right" else -yaw) / 2
+        for axis, (low, high), joint in zip(leg.axes[:3], leg.limits_rad, leg.joints, strict=False):
+            angle = turn * np.sign(axis[2])
+            if abs(axis[2]) > UPRIGHT and not low <= angle <= high:
+                return joint, 2 * abs(float(low if angle < low else high))
+    return None
 
 
 def make_humanoid(

@@ -1,15 +1,13 @@
 """The humanoid problems: single support, double support and walking cycle."""
 
 from dataclasses import dataclass
-from functools import partial
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
 from nlp_gait.gaits.biped.problems import LoadOptions, MotorOptions, PhaseOptions, make_support_problem
-from nlp_gait.gaits.biped.walking import CycleOptions, WalkOptions, make_cycle_problem, make_walk_problem
+from nlp_gait.gaits.biped.walking import CycleOptions, WalkOptions, plan_cycle, plan_walk
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
-from nlp_gait.gaits.humanoid.turning import check_turns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +66,7 @@ def humanoid_cycle(robot: HumanoidOptions, options: CycleOptions) -> GaitProblem
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; general legs, the free lean of the torso and the
         cycle are this package's own.
     """
-    return make_cycle_problem(robot.make_body(), options)
+    return plan_cycle(robot.make_body(), options)
 
 
 @maker
@@ -87,4 +85,4 @@ def humanoid_walk(robot: HumanoidOptions, options: WalkOptions, stairs: Stairs) 
             raise InputError(f"stairs are level, but slope_deg is {options.slope_deg:g}; leave out one of them")
         foot, clearance_m = body.robot.feet["left"], body.scale_length(CLEARANCE_M)
         flight = Flight(rise_m=stairs.stair_rise_m, run_m=stairs.stair_run_m, foot=foot, clearance_m=clearance_m)
-    return make_walk_problem(body, options, partial(check_turns, body), flight)
+    return plan_walk(body, options, flight)

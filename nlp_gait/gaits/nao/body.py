@@ -11,6 +11,7 @@ from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import InstantPoint, Point
 from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, Support
+from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import Instant, Samples
@@ -63,17 +64,12 @@ ARM_COORDINATE = Coordinate(
 )
 
 
-def load_nao(robot: str) -> Robot:
-    """Return the robot of a NAO problem: joints that no gait moves are locked at zero.
+def lock_unused_joints(loaded: Robot) -> Robot:
+    """Return a robot of NAO's build with the joints locked at zero that no gait moves.
 
     NAO's head and neck become one with the torso; another robot may have fingers, or no neck. Raises InputError without the
     joints that the gait moves, or if the closed form does not solve its legs.
     """
-    return lock_unused_joints(load_robot(robot))
-
-
-def lock_unused_joints(loaded: Robot) -> Robot:
-    """Return a robot of NAO's build with the joints locked at zero that no gait moves; raises as ``load_nao``."""
     try:
         for joint in nao_joints.JOINTS:
             loaded.joint(joint)
@@ -83,12 +79,6 @@ def lock_unused_joints(loaded: Robot) -> Robot:
     for side in "LR":
         nao_joints.measure_leg(welded, side)
     return welded
-
-
-def find_upright_links(robot: Robot) -> frozenset[str]:
-    """Return the links that keep the world's axes: torso, soles, and hips whose yaw-pitch joint is held at zero."""
-    hips = (robot.joint(f"{side}HipYawPitch").child for side in "LR")
-    return frozenset((robot.root, *hips, *(foot.link for foot in robot.feet.values())))
 
 
 def move_arms(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX) -> dict[str, Motion]:
@@ -205,6 +195,14 @@ class NaoBody(Body):
 
         return margins
 
+    def check_footholds(self, footholds: Sequence[Foothold]) -> None:
+        """Raise InputError if a foot turns."""
+        if any(foothold.yaw for foothold in footholds):
+            raise InputError(
+                f"robot {self.full.name!r} does not turn: NAO has one motor for both hip yaw-pitch joints, so that no foot turns "
+                "alone; turns are planned for legs whose hip joints turn one by one"
+            )
+
     def make_curve_limits(self, phase: Support, count: int) -> tuple[Limit, ...]:
         """Return the limits of the arms' joints that swing."""
         return (AngleLimits("arm_angle", self.robot, tuple(ARM_SWING[phase])),) if count else ()
@@ -232,6 +230,7 @@ def make_nao(
     leg_length = left.thigh_m + left.tibia_m
     ground = left.ankle_height_m - left.hip_m[2]
     lowest, highest = (round(ground + share * leg_length, 3) for share in HEIGHT_SHARES)
+    hips = (simulated.joint(name).child for name in nao_joints.YAW_PITCHES)
     separate = tuple(side + joint for side in "LR" for joint in nao_joints.ARM_JOINTS)
     return NaoBody(
         family="nao",
@@ -244,7 +243,8 @@ def make_nao(
         images=tuple(map(find_partner, nao_joints.JOINTS)),
         leg_joints={side: tuple(joint for joint in nao_joints.JOINTS if joint.startswith(side)) for side in "LR"},
         coordinates=(ARM_COORDINATE,),
-        upright=find_upright_links(simulated),
+        # Torso, soles, and hips whose yaw-pitch joint is held at zero keep the world's axes.
+        upright=frozenset((simulated.root, *hips, *(foot.link for foot in simulated.feet.values()))),
         gravity=GRAVITY,
         feet_y=(left.hip_m[1], right.hip_m[1]),
         leg_length_m=leg_length,

@@ -131,7 +131,7 @@ def make_free_single_support_phase(body: NaoBody, step_m: float, trajectory: Tra
     )
 
 
-def fit_joints(trajectory: Trajectory, planned: GaitProblem, x: Array) -> Array:
+def fit_joints(trajectory: str, planned: GaitProblem, x: Array) -> Array:
     """Return the point (n,) of free joints whose motion is nearest to a motion x of ``nao_ssp`` with the same robot and step."""
     planned_x = x[: sum("[" not in name for name in planned.names)]
     spans = SPANS[trajectory]

@@ -12,7 +12,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import InstantPoint, Point
-from nlp_gait.gaits.biped.body import Angles, Support
+from nlp_gait.gaits.biped.body import LEAN, Angles, Support
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, RowsAndIndexes, make_rows_at_samples
 from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.nao.body import NaoBody
@@ -23,7 +23,6 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.rotations import FORWARD, TO_THE_LEFT, UP, axis_rotation
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, map_motion, stack
 
-LEAN = ("torso_roll", "torso_pitch")
 # A sole turned by this leaves the ground by a tenth of a micrometre: largest error of the closed chain [rad].
 FLAT = 1e-6
 # Each step of Newton's method squares the error: from 0.3 rad of lean four reach rounding; limits on the turn check that.

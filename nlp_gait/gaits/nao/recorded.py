@@ -10,18 +10,18 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Constraint, GaitProblem, Grid, Parameter, Point, Signals, load
+from nlp_gait.formulation import Constraint, GaitProblem, Grid, Parameter, Point, Signals, SolverHints, load
 from nlp_gait.formulation.assembly import NumericPoint, RowsOverTime, Variable
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Support
 from nlp_gait.gaits.biped.bounds import make_hip_variables, make_lift_variable, make_time_variable
-from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins, make_cycle_problem
+from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins
 from nlp_gait.gaits.biped.cycle_motion import STEP, make_cycle_variables
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import BalanceMargins, Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.loads import Division, make_divided_loads, make_single_support_loads
-from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
+from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.samples import CORNERS, LEAST_DURATION, Samples
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
 from nlp_gait.gaits.biped.switch import SWITCHES
@@ -219,8 +219,7 @@ def make_recorded_phase_problem(kind: Support, motion: RecordedMotion, grid: Gri
         balance, foot = limit_to_box(make_support_box(body.robot, {"L": left, "R": (x, y)})), StandingLimits()
     variables = (make_time_variable(body, kind),)
     phase = make_recorded_phase(motion, kind, variables, grid, "printed", (balance, hip, foot))
-    title = f"A recorded gait of {body.title}, {'single' if kind is Support.SINGLE else 'double'} support"
-    return replace(make_phase_problem(kind, "", phase), name=f"recorded-{kind}", title=title)
+    return make_phase_problem(kind, f"{'single' if kind is Support.SINGLE else 'double'} support", phase)
 
 
 def make_recorded_cycle_problem(motions: Mapping[Support, RecordedMotion], repeats: bool, grid: Grid) -> GaitProblem:
@@ -239,8 +238,7 @@ def make_recorded_cycle_problem(motions: Mapping[Support, RecordedMotion], repea
         for kind, limits in ((Support.SINGLE, single), (Support.DOUBLE, double))
     }
     cycle = WalkingCycle(body=body, variables=variables, phases=phases, at_given_speed=False)
-    problem = make_cycle_problem("recorded-cycle", cycle, rows_over_time=False, repeats=repeats)
-    return replace(problem, title=f"A recorded gait of {body.title}, a walking cycle")
+    return make_gait_problem(cycle, "cycle", "a walking cycle", SolverHints(), repeats=repeats)
 
 
 def make_recorded_gait(
@@ -259,7 +257,8 @@ def make_recorded_gait(
     if gait is not None and gait not in GAITS:
         raise InputError(f"a motion is judged by the limits of {', '.join(GAITS)}, got {gait!r}")
     options: Mapping[str, str | int] = {"robot": robot, "intervals": intervals}
-    motion = read_motion(angles, make_nao(robot))
+    nao = make_nao(robot)
+    motion = read_motion(angles, replace(nao, family="recorded", title=f"A recorded gait of {nao.title}"))
     if touch_down_s is None and gait in ("nao-ssp", "nao-dsp"):
         phases = {Support.SINGLE if gait == "nao-ssp" else Support.DOUBLE: (0.0, motion.duration_s)}
     else:

@@ -1,11 +1,7 @@
 """Walking of NAO: its cycle and its whole walk."""
 
-from collections.abc import Sequence
-
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
-from nlp_gait.gaits.biped.footholds import Foothold
-from nlp_gait.gaits.biped.walking import CycleOptions, WalkOptions, make_cycle_problem, make_walk_problem
+from nlp_gait.gaits.biped.walking import CycleOptions, WalkOptions, plan_cycle, plan_walk
 from nlp_gait.gaits.nao.problems import NaoMotorOptions
 
 
@@ -22,7 +18,7 @@ def nao_cycle(robot: NaoMotorOptions, options: CycleOptions) -> GaitProblem:
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walking cycle by this package.
     """
-    return make_cycle_problem(robot.make_body(), options)
+    return plan_cycle(robot.make_body(), options)
 
 
 @maker
@@ -37,9 +33,4 @@ def nao_walk(robot: NaoMotorOptions, options: WalkOptions) -> GaitProblem:
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
     """
-
-    def check(places: Sequence[Foothold]) -> None:
-        if any(place.yaw for place in places):
-            raise InputError("footholds of NAO all point forward; leave out angles")
-
-    return make_walk_problem(robot.make_body(), options, check)
+    return plan_walk(robot.make_body(), options)
