@@ -160,13 +160,6 @@ def write_text(path: Path, text: str) -> Path:
     return path
 
 
-def write_bytes(path: Path, content: bytes) -> Path:
-    """Write a file atomically and return its path; raises as ``write_text``."""
-    with replace_file(path) as temporary:
-        temporary.write_bytes(content)
-    return path
-
-
 def format_csv(rows: Iterable[Sequence[object]]) -> str:
     """Return rows as comma-separated values, cells quoted where necessary, lines ended by a line feed.
 

@@ -14,7 +14,7 @@ import shlex
 import shutil
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import redirect_stdout
 from functools import cache, lru_cache, partial
 from importlib.metadata import entry_points
@@ -138,12 +138,8 @@ def parse_command(text: str) -> tuple[str, ...]:
 def _find_program_file(text: str) -> str:
     """Return the absolute path of a command's own file: the script that it names, else the program."""
     words = parse_command(text)
-    return os.path.abspath(_find_own_word(words) or shutil.which(words[0]) or words[0])
-
-
-def _find_own_word(words: Sequence[str]) -> str | None:
-    programs = (word for word in words if os.path.isfile(word) and not (word == words[0] and os.path.isabs(word)))
-    return next(programs, None)
+    scripts = (word for word in words if os.path.isfile(word) and not (word == words[0] and os.path.isabs(word)))
+    return os.path.abspath(next(scripts, None) or shutil.which(words[0]) or words[0])
 
 
 def hash_source(text: str, kind: Kind) -> str:

@@ -8,9 +8,10 @@ import math
 import random
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from itertools import zip_longest
+from operator import call
 from pathlib import Path
 from typing import NamedTuple
 
@@ -201,8 +202,7 @@ def _find_deviations(record: RunRecord, task: Task) -> Iterator[str]:
     inputs, problem = record.inputs, record.inputs.problem
     solver = inputs.solver["name"] if isinstance(inputs.solver, Mapping) else inputs.solver
     same_solver = solver == task.solver or task.is_user_code
-    limits = {name: value for name, value in asdict(task.stop).items() if value is not None}
-    spec = task.problem
+    limits, spec = task.stop.limits, task.problem
     for what, is_same in (
         ("seed", inputs.seed == task.run_seed),
         ("solver", same_solver and inputs.polish == task.polish),
@@ -319,13 +319,9 @@ def _repeat_runs(
     for record in chosen[:needed]:  # built before the forks
         load_problem(_move_files(record, places))
     calls: list[Callable[[], Finding]] = [check_texts, *(partial(repeat, record) for record in chosen)]
-    first = compute_in_forks(_call, calls[: needed + 1])
-    further = compute_in_forks(_call, calls[needed + 1 :], lambda: time.monotonic() - began > FURTHER_S)
+    first = compute_in_forks(call, calls[: needed + 1])
+    further = compute_in_forks(call, calls[needed + 1 :], lambda: time.monotonic() - began > FURTHER_S)
     return [*first, *further]
-
-
-def _call(check: Callable[[], Finding]) -> Finding:
-    return check()
 
 
 def _repeat_run(record: RunRecord, moved: RunRecord) -> str:

@@ -100,9 +100,9 @@ def make_axes(width_in: float, height_in: float = 3.0) -> tuple[Figure, Axes]:
     return figure, figure.subplots()
 
 
-def add_legend_below(figure: Figure, axes: Axes | None = None) -> None:
-    """Add the legend of some axes, by default the first ones, below the figure, which grows accordingly."""
-    handles, labels = (axes or figure.axes[0]).get_legend_handles_labels()
+def add_legend_below(figure: Figure) -> None:
+    """Add the legend of the first axes below the figure, which grows accordingly."""
+    handles, labels = figure.axes[0].get_legend_handles_labels()
     if not labels:
         return
     letters = 14 * figure.get_figwidth()  # in a row at the legend's size

@@ -15,42 +15,33 @@ COLOURS = {LEFT: "#0072B2", RIGHT: "#D55E00", TRUNK: INK}
 GROUND = "#909090"
 MARGIN = 0.04  # [m] around everything that moves
 POSES, FAINTEST = 6, 0.25  # number of poses, and opacity of the first one; the last one has 1
-# Directions to the right and up.
-SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 class View(NamedTuple):
-    """A parallel projection into a rectangle."""
+    """A view from the side."""
 
-    axes: Array  #: (2, 3) directions to the right and up
     scale: float  #: [pixels/m]
     corner: Array  #: (2,) place of the origin [pixels]
 
     def project(self, points: Array) -> Array:
         """Return the pixels (..., 2) of points (..., 3)."""
-        return self.corner + self.scale * (points @ self.axes.T) * (1.0, -1.0)
+        return self.corner + self.scale * points[..., [0, 2]] * (1.0, -1.0)
 
 
-def _fit(skeleton: Skeleton, axes: Array, left: float, top: float, right: float, bottom: float) -> View:
-    """Return the projection that shows all samples within a rectangle."""
-    corners = np.array(np.meshgrid(*_find_box(skeleton).T)).reshape(3, -1).T @ axes.T * (1.0, -1.0)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    scale = float(min((right - left, bottom - top) / (high - low)))
-    return View(axes, scale, np.array([left + right, top + bottom]) / 2.0 - scale * (low + high) / 2.0)
-
-
-def _find_box(skeleton: Skeleton) -> Array:
-    """Return the least and greatest coordinates (2, 3) of what moves and of the ground, with a margin."""
+def _fit(skeleton: Skeleton, width: float, height: float) -> View:
+    """Return the view that shows all samples and the ground with a margin, below a line of text."""
     low, high = skeleton.box()
     low[2] = min(low[2], skeleton.ground[:, 1].min() if skeleton.planar else 0.0)
-    return np.array([low - MARGIN, high + MARGIN])
+    ends = np.array([low - MARGIN, high + MARGIN])[:, [0, 2]] * (1.0, -1.0)
+    scale = float(min((width, height - LINE) / np.abs(ends[1] - ends[0])))
+    return View(scale, np.array([width, LINE + height]) / 2.0 - scale * (ends[0] + ends[1]) / 2.0)
 
 
 def draw_poses(
     name: str, first: Skeleton, width: float, height: float, over: tuple[str, Skeleton, Look] | None = None
 ) -> Drawing:
     """Draw poses of a gait from the side, later ones darker, and some of another gait dashed over it."""
-    view = _fit(first, SIDE, 0.0, LINE, width, height)
+    view = _fit(first, width, height)
     ground = np.insert(first.ground, 1, 0.0, axis=1)
     shapes: list[Stroke | Label] = [Stroke(lines=[view.project(ground)], colour=GROUND)]
     chosen = np.unique(np.linspace(0, len(first.t) - 1, POSES).round().astype(int)).tolist()
@@ -65,7 +56,7 @@ def draw_poses(
     return Drawing(width=width, height=height, shapes=[*shapes, Label(x=width / 2, y=LINE - 4, text=title)])
 
 
-def _draw_pose(skeleton: Skeleton, k: int, view: View, opacity: float = 1.0) -> list[Stroke | Label]:
+def _draw_pose(skeleton: Skeleton, k: int, view: View, opacity: float) -> list[Stroke | Label]:
     """Draw limbs and soles at sample k."""
     parts = [(limb.side, limb.points[k], 1.5) for limb in skeleton.limbs]
     parts += [(sole.side, np.concatenate([sole.corners[k], sole.corners[k, :1]]), 2.4) for sole in skeleton.soles]

@@ -12,7 +12,7 @@ from compare.drawing.shapes import COLUMN, Drawing
 from compare.report.document import Document, Figure, iterate_leaves
 from compare.report.latex import describe_run_counts, escape_latex, format_latex_overview, format_latex_table
 from compare.report.study_sections import FIGURES
-from compare.study.record import HEADER, JUDGED, make_judged_cells, make_row
+from compare.study.record import COLUMNS, JUDGED, list_variables, make_row
 from nlp_gait.files import format_csv, make_file_name, replace_nan, write_text
 
 TableRows = Sequence[Sequence[object]]
@@ -58,9 +58,9 @@ class FurtherFiles:
 
 
 def make_runs_table(comparisons: Sequence[Comparison]) -> TableRows:
-    """Return all runs: ``HEADER``, dimension, budget, gap, equivalent evaluations, and costs to each target, empty if missed."""
+    """Return all runs: ``COLUMNS``, dimension, budget, gap, equivalent evaluations, and costs to each target, empty if missed."""
     to_targets = [f"{axis}_to_{target:g}" for axis in COSTS for target in TARGETS]
-    rows: list[Sequence[object]] = [(*HEADER, *MEASURED, *to_targets)]
+    rows: list[Sequence[object]] = [(*COLUMNS, *MEASURED, *to_targets)]
     for comparison in comparisons:
         for solver in comparison.solvers:
             for record, curve, cost in zip(solver.records, solver.curves, solver.costs, strict=True):
@@ -76,13 +76,13 @@ def _make_point_tables(comparisons: Sequence[Comparison]) -> dict[str, TableRows
     tables: dict[str, TableRows] = {}
     for comparison in comparisons:
         records = comparison.records
-        names = list(dict.fromkeys(name for record in records for name in record.x))
+        names = list_variables(records)
         taken = {*names, *JUDGED}
         indexes = list(dict.fromkeys(name for r in records for name in r.verdict.indexes if name not in taken))
         tables[f"{make_file_name(comparison.problem)}-points"] = [
             ("solver", "run", *names, *JUDGED, *indexes),
             *(
-                (r.solver, r.run, *map(r.x.get, names), *make_judged_cells(r), *map(r.verdict.indexes.get, indexes))
+                (r.solver, r.run, *map(r.x.get, names), *make_row(r, JUDGED), *map(r.verdict.indexes.get, indexes))
                 for r in records
                 if r.x
             ),

@@ -144,13 +144,8 @@ def _read_histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History,
     missing = [run for run in runs if run not in found]
     if missing:
         raise InputError(f"{table.owner}: run {missing[0]} has no history")
-    return {
-        run: (
-            History(evaluations=tuple(e for e, _, _ in entries), objective=tuple(f for _, f, _ in entries)),
-            tuple(t for _, _, t in entries),
-        )
-        for run, entries in found.items()
-    }
+    courses = {run: zip(*entries, strict=True) for run, entries in found.items()}
+    return {run: (History(evaluations=counts, objective=f), times) for run, (counts, f, times) in courses.items()}
 
 
 def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> CheckedRecords:

@@ -11,6 +11,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -34,13 +35,7 @@ SCHEMA = 5
 OPTIONAL = {"origin", "finished"}  # fields that a file may lack
 REMEDY = "delete it to have the run repeated"
 CALLS = tuple(kind.name for kind in fields(Evaluations))
-JUDGED = ("objective", "violation", "feasible", "feasible_between_samples", "guaranteed")
-HEADER = (
-    *("problem", "solver", "run", "seed", "claimed", "status", "claimed_objective", "claimed_violation"),
-    *JUDGED,
-    *(f"calls_{kind}" for kind in CALLS),
-    *("failed_evaluations", "iterations", "time_s"),
-)
+CLAIMED = ("problem", "solver", "run", "seed", "claimed", "status", "claimed_objective", "claimed_violation")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -251,27 +246,36 @@ def load_problem(record: RunRecord) -> GaitProblem:
     return ProblemSpec(name=name, options=options, values=stored.parameters).load()
 
 
-def make_row(record: RunRecord) -> list[object]:
-    """Return a run under ``HEADER``; None for unknown values."""
-    calls = [record.evaluations.get(kind) for kind in CALLS]
-    claims = (record.claimed, record.status, record.claimed_objective, record.claimed_violation)
-    counts = (None, None) if record.inputs.imported else (record.failed_evaluations, record.iterations)
-    return [
-        *(record.problem, record.solver, record.run, record.seed, *claims),
-        *make_judged_cells(record),
-        *(*calls, *counts, record.time_s.solve),
-    ]
+# Columns of tables of runs: what the judge finds, and everything.
+JUDGED: dict[str, Callable[[RunRecord], object]] = {
+    "objective": attrgetter("verdict.objective"),
+    "violation": attrgetter("verdict.violation"),
+    "feasible": attrgetter("verdict.feasible"),
+    "feasible_between_samples": attrgetter("verdict.dense_feasible"),
+    "guaranteed": lambda record: record.verdict.guaranteed and record.verdict.guaranteed.satisfied,
+}
+COLUMNS: dict[str, Callable[[RunRecord], object]] = {
+    **{name: attrgetter(name) for name in CLAIMED},
+    **JUDGED,
+    **{f"calls_{kind}": lambda record, kind=kind: record.evaluations.get(kind) for kind in CALLS},  # type: ignore[misc]
+    "failed_evaluations": lambda record: None if record.inputs.imported else record.failed_evaluations,
+    "iterations": lambda record: None if record.inputs.imported else record.iterations,
+    "time_s": attrgetter("time_s.solve"),
+}
 
 
-def make_judged_cells(record: RunRecord) -> list[object]:
-    """Return what the judge finds of a run, under ``JUDGED``."""
-    verdict = record.verdict
-    guaranteed = None if verdict.guaranteed is None else verdict.guaranteed.satisfied
-    return [verdict.objective, verdict.violation, verdict.feasible, verdict.dense_feasible, guaranteed]
+def make_row(record: RunRecord, columns: Mapping[str, Callable[[RunRecord], object]] = COLUMNS) -> list[object]:
+    """Return a run as a row of a table; None for unknown values."""
+    return [compute(record) for compute in columns.values()]
+
+
+def list_variables(records: Iterable[RunRecord]) -> list[str]:
+    """Return the names of all variables of some runs."""
+    return list(dict.fromkeys(name for record in records for name in record.x))
 
 
 def make_frame(records: Sequence[RunRecord]) -> Any:
-    """Return records as a pandas frame: ``HEADER`` and a column ``x.<name>`` per variable; raises MissingExtraError."""
-    names = list(dict.fromkeys(name for record in records for name in record.x))
-    rows = [[*make_row(record), *(record.x.get(name) for name in names)] for record in records]
-    return import_pandas().DataFrame(rows, columns=[*HEADER, *(f"x.{name}" for name in names)])
+    """Return records as a pandas frame: ``COLUMNS`` and a column ``x.<name>`` per variable; raises MissingExtraError."""
+    names = list_variables(records)
+    rows = [[*make_row(record), *map(record.x.get, names)] for record in records]
+    return import_pandas().DataFrame(rows, columns=[*COLUMNS, *(f"x.{name}" for name in names)])

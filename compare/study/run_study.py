@@ -1,18 +1,19 @@
 """A study: solvers x problems x runs, one record for each finished run, in this process, in workers, or on a Dask cluster."""
 
+import logging
+import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from compare.study.cluster import run_on_cluster
 from compare.study.evidence import check_records
 from compare.study.origin import hash_installed_code
 from compare.study.record import RunRecord, check_readable
 from compare.study.record_files import find_record, locate_record, name_run, write_record
-from compare.study.run_task import PLANNED_RUNS, try_task
+from compare.study.run_task import MOST_REASON, PLANNED_RUNS, try_task
 from compare.study.settings import list_runs
 from compare.study.task import Task, check_task
 from nlp_gait.errors import GaitError, InputError, NoWorkersError, OutputError, WorkerError
@@ -23,6 +24,7 @@ from nlp_gait.progress import Progress
 
 # A study continues in new processes if one dies, unless they die so often without finishing any run.
 DEATHS_WITHOUT_PROGRESS = 3
+CONNECT_TIMEOUT = "10s"  # to a Dask scheduler
 
 
 def run_tasks(
@@ -66,6 +68,46 @@ def run_tasks(
                     f"a worker process died {deaths} times in a row, perhaps out of memory; finished runs are stored: "
                     "rerun with fewer --jobs to continue"
                 ) from error
+
+
+def run_on_cluster(
+    tasks: Mapping[int, tuple[Task, RunRecord | None]], scheduler: str
+) -> Iterator[tuple[int, RunRecord]]:
+    """Run tasks as ``run_tasks`` on the workers of a scheduler, and yield the key and the record of each as it finishes.
+
+    The scheduler repeats the runs of a worker that dies. Files of user code and robots must have the same paths for the workers;
+    relative ones start in the working folder of this process.
+
+    Raises:
+        InputError: no scheduler answers at the address, or Dask is not installed.
+        WorkerError: the scheduler is lost, or its workers cannot perform the runs.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError as error:
+        raise InputError("--scheduler needs Dask: pip install 'nlp-gait[cluster]'") from error
+
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are reported in one sentence
+    with convert_errors(f"no Dask scheduler answers at {scheduler!r}", InputError, "start one with `dask scheduler`"):
+        client = Client(scheduler, timeout=CONNECT_TIMEOUT)
+    with client:
+        try:
+            futures = {client.submit(_try_task, os.getcwd(), *call, pure=False): key for key, call in tasks.items()}
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except Exception as error:  # of Dask, or of the worker's own Python, which may lack a package
+            reason = " ".join(str(error).split())[:MOST_REASON]
+            raise WorkerError(
+                f"the Dask cluster at {scheduler!r} failed: {reason}; finished runs are stored: rerun the same command to "
+                "continue. Its workers need the same nlp-gait and extras as this machine"
+            ) from error
+
+
+def _try_task(folder: str, task: Task, search: RunRecord | None) -> RunRecord:
+    if os.path.isdir(folder):
+        os.chdir(folder)
+    return try_task(task, search)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

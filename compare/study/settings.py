@@ -91,7 +91,7 @@ class StudySettings:
             "starts": self.starts,
             "handling": {"name": self.handling.name, **self.handling.settings},
             "seed": self.seed,
-            **{key: value for key, value in asdict(self.stop).items() if value is not None},
+            **self.stop.limits,
         }
 
 

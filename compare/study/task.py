@@ -4,7 +4,7 @@ import inspect
 import json
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -124,6 +124,11 @@ class Stop:
     stagnation: int | None = None  #: generations without improvement that end a search
     time_limit_s: float | None = None  #: wall time [s]
 
+    @property
+    def limits(self) -> dict[str, int | float]:
+        """Criteria that are set, by name."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
     def end_early(self, sign: float) -> EarlyStop:
         """Return what ends a search of a problem, whose objective is minimised (sign 1) or maximised (-1), before its budget."""
         target = None if self.target is None else sign * self.target
@@ -166,15 +171,7 @@ class Inputs:
         solver = self.solver
         if isinstance(solver, Mapping) and "name" in solver:
             solver = {**solver, "name": shorten_name(solver["name"])}
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        handling = None if self.handling is None else asdict(self.handling)
-        return {
-            **values,
-            "problem": make_key(self.problem),
-            "objective": asdict(self.objective),
-            "solver": solver,
-            "handling": handling,
-        }
+        return {**asdict(self), "problem": make_key(self.problem), "solver": solver}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,7 +221,7 @@ class Task:
     def inputs(self) -> Inputs:
         """Return everything that the result depends on, as plain data; raises InputError for settings that are not plain."""
         problem, known = self.problem.load(), () if self.is_search else list_settings(str(self.solver))
-        limits = {key: value for key, value in asdict(self.stop).items() if value is not None}
+        limits = self.stop.limits
         if not self.is_search and "evaluations" not in known:  # it ends by itself, or by the clock
             limits = {key: value for key, value in limits.items() if key == "time_limit_s"}
         try:

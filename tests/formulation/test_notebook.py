@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from compare.study.record import HEADER, RunRecord, make_frame
+from compare.study.record import COLUMNS, RunRecord, make_frame
 from compare.study.run_study import Study
 from compare.study.task import ProblemSpec, Task
 from nlp_gait.errors import UnknownNameError
@@ -69,7 +69,7 @@ def test_records_and_studies_are_one_line_and_a_frame(tmp_path: Path) -> None:
     assert repr(run) == "<RunRecord of swarm on walk, run 0: power 10.05 W>"
     pytest.importorskip("pandas")
     frame = make_frame([run, record("colony", 0, [(500, None)], feasible=False)])
-    assert tuple(frame.columns) == (*HEADER, "x.a", "x.b") and list(frame["feasible"]) == [True, False]
+    assert tuple(frame.columns) == (*COLUMNS, "x.a", "x.b") and list(frame["feasible"]) == [True, False]
     tasks = tuple(Task(problem=ProblemSpec(name="nao-dsp"), solver="pso", run=k) for k in range(2))
     study = Study(tasks=tasks, folder=tmp_path)
     assert repr(study) == f"<Study of nao-dsp by pso: 2 runs, in {str(tmp_path)!r}>"

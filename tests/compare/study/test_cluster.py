@@ -109,6 +109,6 @@ def test_workers_find_user_code_and_killed_processes_lose_no_run(
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_no_scheduler_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("compare.study.cluster.CONNECT_TIMEOUT", "1s")
+    monkeypatch.setattr("compare.study.run_study.CONNECT_TIMEOUT", "1s")
     with pytest.raises(InputError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
         run_study(Study(tasks=STUDY.tasks(), folder=tmp_path, scheduler="tcp://127.0.0.1:9"))
