@@ -64,7 +64,7 @@ def keep_working_folder() -> Iterator[None]:
 
 
 def has_fork() -> bool:
-    """Return whether this process may fork: not on Windows, and not in Dask's workers."""
+    """Return whether this process may fork: not on Windows, and not in workers of multiprocessing.Pool and Dask."""
     return "fork" in multiprocessing.get_all_start_methods() and not multiprocessing.current_process().daemon
 
 

@@ -21,7 +21,7 @@ from nlp_gait.errors import InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.solution import ActiveConstraint, Guess, Outcome, Solution
 from nlp_gait.interrupts import Interrupted, Stop, defer_interrupts, never
-from nlp_gait.processes import run_in_forks
+from nlp_gait.processes import has_fork, run_in_forks
 
 # A price below this, times the bound's scale, is numerical noise and not reported.
 PRICE_TOLERANCE = 1e-6
@@ -134,7 +134,7 @@ def run_starts(
         workers = count_workers() if fork_pays else 1
         if stop():
             return
-    count = min(workers or 1, len(points))
+    count = min(workers or 1, len(points)) if has_fork() else 1
     if count > 1:
         build_exact_model(problem)  # every run needs it: built before the fork
         yield from run_in_forks(lambda k, is_over: solver.run(problem, points[k], is_over), len(points), count, stop)

@@ -4,7 +4,6 @@ Nothing but corners is read, and hostile files are refused; libraries for meshes
 """
 
 import math
-import multiprocessing
 import os
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -16,7 +15,7 @@ import numpy as np
 
 from nlp_gait.errors import RobotDataError, WorkerError
 from nlp_gait.files import read_bytes
-from nlp_gait.processes import run_in_isolation
+from nlp_gait.processes import has_fork, run_in_isolation
 from nlp_gait.robots.robot import are_plausible
 from nlp_gait.robots.tree import Array, rotate
 
@@ -207,10 +206,11 @@ LARGEST_RESULT = 256 * 2**20  # bytes
 def read_in_child(owner: str, read: Callable[[], bytes]) -> bytes:
     """Return what ``read`` returns, in a forked process with limits of time and memory; Ctrl-C ends it at once.
 
-    Where a system has no forks (Windows), it is called in this process, without limits. ``owner`` is the kind and name of the
-    file, for messages. Raises RobotDataError as ``read`` may, or if it took too much time or memory, or its process died.
+    Where this process may not fork (on Windows, in workers of a pool), it is called in this one, without limits. ``owner`` is
+    the kind and name of the file, for messages. Raises RobotDataError as ``read`` may, or if it took too much time or memory, or
+    its process died.
     """
-    if "fork" not in multiprocessing.get_all_start_methods():
+    if not has_fork():
         return read()
     memory = f"more than {MEMORY_LIMIT_BYTES // 2**30} GiB of memory"
     fault = f"{owner} probably needs {memory} to be read; simplify the file"

@@ -132,8 +132,13 @@ def test_what_a_run_raises_is_raised_and_a_dead_process_is_reported() -> None:
     assert not multiprocessing.active_children()
 
 
+def solve_with_workers() -> int:
+    return len(nlp_gait.solve(nlp_gait.load("walk12"), starts=2, workers=2).starts)
+
+
 def test_a_worker_forks_no_workers_and_their_number_is_checked() -> None:
     with multiprocessing.get_context("fork").Pool(1) as pool:
         assert pool.apply(count_workers) == 1
+        assert pool.apply(solve_with_workers) == 2
     with pytest.raises(InputError, match="workers must be a whole number >= 1"):
         nlp_gait.solve(toy(corner), workers=0)
