@@ -62,18 +62,20 @@ def falls(run: Run, impulse_Ns: tuple[float, float], settle_s: float) -> bool:
     return pushed.fell_at_s is not None
 
 
-def bisect(forks: list[Run], direction: str, unit_Ns: float, settle_s: float) -> float:
-    """Return the least impulse at which half of the simulations fall, to 1 / LEVELS of the largest [N s]."""
-    (x, y), low, high = DIRECTIONS[direction], 0, LEVELS
+def bisect(
+    runs: list[Run], direction: str, unit_Ns: float, settle_s: float, falls_needed: int = 1, levels: int = LEVELS
+) -> tuple[float, float]:
+    """Return two neighbouring impulses [N s], of ``levels`` up to the largest: so many of the runs fall at the second only."""
+    (x, y), low, high = DIRECTIONS[direction], 0, levels
+    level_Ns = LARGEST * unit_Ns / levels
     while high - low > 1:
-        middle = (low + high) // 2
-        impulse, fallen = LARGEST * unit_Ns * middle / LEVELS, 0
-        for k, run in enumerate(forks):
-            fallen += falls(run, (x * impulse, y * impulse), settle_s)
-            if 2 * fallen >= len(forks) or 2 * (fallen + len(forks) - k - 1) < len(forks):
+        middle, fallen = (low + high) // 2, 0
+        for k, run in enumerate(runs):
+            fallen += falls(run, (x * middle * level_Ns, y * middle * level_Ns), settle_s)
+            if not fallen < falls_needed <= fallen + len(runs) - k - 1:  # decided
                 break
-        low, high = (low, middle) if 2 * fallen >= len(forks) else (middle, high)
-    return LARGEST * unit_Ns * high / LEVELS
+        low, high = (low, middle) if fallen >= falls_needed else (middle, high)
+    return low * level_Ns, high * level_Ns
 
 
 def tabulate_pushes(paths: list[str]) -> Iterator[str]:
@@ -90,7 +92,7 @@ def tabulate_pushes(paths: list[str]) -> Iterator[str]:
             if len(forks) < INSTANTS:
                 yield cells(name, f"{unit:.0f}", feedback, f"falls at {run.fell_at_s:.1f} s without a push", "", "", "")
                 continue
-            impulses = (bisect(forks, direction, unit, settle) for direction in DIRECTIONS)
+            impulses = (bisect(forks, direction, unit, settle, INSTANTS // 2)[1] for direction in DIRECTIONS)
             yield cells(name, f"{unit:.3g}", feedback, *(f"{impulse:.3g}" for impulse in impulses))
 
 
@@ -143,7 +145,7 @@ def tabulate_rest(paths: list[str]) -> Iterator[str]:
                 yield cells(name, feedback, f"falls at {run.fell_at_s:.1f} s", "", "", "", tick)
                 continue
             bounds = find_bounds(plan, run, pendulum)
-            shares = (bisect([run], way, unit, SETTLE / pendulum) / bounds[way] for way in DIRECTIONS)
+            shares = (bisect([run], way, unit, SETTLE / pendulum)[1] / bounds[way] for way in DIRECTIONS)
             yield cells(name, feedback, *(f"{share:.2f}" for share in shares), tick)
 
 

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 import nlp_gait
+from benchmarks.balance import FEEDBACKS, SETTLE, bisect
 from benchmarks.engine.gaits import DIRECTIONS
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.backends.exact import build_exact_model
@@ -88,10 +89,7 @@ ROBOTS: Mapping[str, tuple[str, ...]] = {
     "mjlab": ("g1",),
 }
 STEPS = 10
-FEEDBACKS = ("none", "balance")
-LEVELS, LARGEST_SHARE = 32, 0.5  # of the bisection, and its largest impulse, of mass sqrt(gravity height)
-PUSH_S = 0.1
-SETTLE = 10.0  # pendulum's times after a push, within which a robot that has lost its balance falls
+LEVELS = 32  # of the bisection
 NO_PUSH = Push(impulse_Ns=(0.0, 0.0))
 
 
@@ -163,25 +161,7 @@ def find_pushes(plan: Plan, drive: Drive, unit_Ns: float) -> dict[str, float]:
         forks.append(run)
         run = run.fork(NO_PUSH)
     settle_s = SETTLE / math.sqrt(plan.gravity / plan.at("hip", np.zeros(1))[0, 2])
-    found = {}
-    for direction, (x, y) in DIRECTIONS.items():
-        low, high = 0, LEVELS
-        while high - low > 1:
-            middle = (low + high) // 2
-            impulse = LARGEST_SHARE * unit_Ns * middle / LEVELS
-            if all(survives(fork, (x * impulse, y * impulse), settle_s) for fork in forks):
-                low = middle
-            else:
-                high = middle
-        found[direction] = LARGEST_SHARE * unit_Ns * low / LEVELS
-    return found
-
-
-def survives(run: Run, impulse_Ns: tuple[float, float], settle_s: float) -> bool:
-    """Return whether a robot that is pushed now is up some time later."""
-    pushed = run.fork(Push(impulse_Ns=impulse_Ns, start_s=run.time_s, duration_s=PUSH_S))
-    pushed.advance(run.time_s + settle_s)
-    return pushed.fell_at_s is None
+    return {way: bisect(forks, way, unit_Ns, settle_s, levels=LEVELS)[0] for way in DIRECTIONS}
 
 
 def list_swings(plan: Plan) -> list[tuple[float, float]]:
