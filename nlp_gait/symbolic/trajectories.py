@@ -164,7 +164,7 @@ def add_motions(first: Motion, second: Motion) -> Motion:
     return Motion(*(a + b for a, b in zip(first, second, strict=True)))
 
 
-def constant_motion(value: float) -> Motion:
+def constant_motion(value: SX | float) -> Motion:
     """Return a motion at rest."""
     return Motion(SX(value), SX(0), SX(0))
 

@@ -159,9 +159,10 @@ class Body(ABC):
         """Return the place of an ankle above its foot ``"L"`` or ``"R"``: across the walking direction, and its height [m]."""
         return self.feet_y["LR".index(side)], self.robot.feet[BOTH_FEET[side]].ankle_height_m
 
-    def standing_ankle(self, side: str, x: float = 0.0) -> Motion:
-        """Return the motion (3,) of an ankle at rest [m]."""
-        return stack(*map(constant_motion, (x, *self.ankle(side))))
+    def standing_ankle(self, side: str, x: SX | float = 0.0, ground: SX | float = 0.0) -> Motion:
+        """Return the motion (3,) of an ankle at rest, above a ground of this height [m]."""
+        y, height = self.ankle(side)
+        return stack(*map(constant_motion, (x, y, height + ground)))
 
     @property
     def support(self) -> tuple[float, float, float]:

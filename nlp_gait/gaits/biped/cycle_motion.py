@@ -11,9 +11,8 @@ from typing import NamedTuple
 from casadi import DM, SX, fmax, vertcat, vertsplit
 
 from nlp_gait.formulation import InstantPoint, Variable
-from nlp_gait.gaits.biped.body import LIFT, Body, Support, read_duration
+from nlp_gait.gaits.biped.body import LIFT, Angles, Body, Support, read_duration
 from nlp_gait.gaits.biped.bounds import make_lift_variable, make_time_variable
-from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.samples import Instant, Planner
 from nlp_gait.gaits.biped.support_phases import swing_foot
@@ -27,15 +26,13 @@ LEAST_STEP = 1e-3  # [m]; a shorter step is evaluated as this one, so that the p
 
 
 class PhaseMotion(NamedTuple):
-    """A phase of a walk over the left foot: from state to state while the right foot swings, or stands if ``lift`` is None."""
+    """A phase of a walk over the left foot, which stands at x = 0: from state to state while the right foot swings or stands."""
 
     start: SwitchState
     end: SwitchState
     duration: SX  # [s]
-    right_from: SX  # x of the right foot from the left one [m]
-    right_to: SX  # at the end [m]
-    lift: SX | None = None  # height of the swing [m]
-    landing_m_s: SX | float = 0.0  # forward velocity of the swinging foot at its end
+    foot: Motion  # ankle (3,) of the right foot [m]
+    turns: Angles = {}  # of torso and right foot, if they turn
 
 
 def make_cycle_variables(body: Body, touch_down: Switch = SOFT_LANDING) -> tuple[Variable, ...]:
@@ -63,39 +60,31 @@ def make_cycle_planners(body: Body, touch_down: Switch) -> dict[Support, Planner
         lift_off, landed = (read_state(point, switch, body.coordinates) for switch in SWITCHES)
         return lift_off, landed, fmax(point[STEP], LEAST_STEP)
 
-    def single(point: InstantPoint) -> PhaseMotion:
+    def single(point: InstantPoint, phase: SX) -> PhaseMotion:
         lift_off, landed, step = read(point)
         duration, speed = read_duration(point, Support.SINGLE), touch_down.read_landing_speed(point)
-        return PhaseMotion(lift_off, landed, duration, -step, step, point[LIFT], speed)
+        foot = swing_foot(-step, step, *body.ankle("R"), point[LIFT], duration, phase, speed)
+        return PhaseMotion(lift_off, landed, duration, foot)
 
-    def double(point: InstantPoint) -> PhaseMotion:
+    def double(point: InstantPoint, phase: SX) -> PhaseMotion:
         (hip, velocity, angles, rates), landed, step = read(point)
         place = mirror * hip + vertcat(step, 0, 0)  # the mirror image of lift-off, a step further
         begin = touch_down.change_state(body, point, landed)
         end = SwitchState(place, mirror * velocity, images * angles, images * rates)
-        return PhaseMotion(begin, end, read_duration(point, Support.DOUBLE), step, step)
+        return PhaseMotion(begin, end, read_duration(point, Support.DOUBLE), body.standing_ankle("R", step))
 
     return {Support.SINGLE: make_planner(body, single), Support.DOUBLE: make_planner(body, double)}
 
 
-def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion], flight: Flight | None = None) -> Planner:
-    """Return the plan of a phase over the left foot, which stands at x = 0, on the flat or on a flight of stairs."""
-    left, right = body.standing_ankle("L"), body.standing_ankle("R")
-    right_y, right_z = body.ankle("R")
+def make_planner(body: Body, read: Callable[[InstantPoint, SX], PhaseMotion]) -> Planner:
+    """Return the plan of a phase over the left foot from a function of its point and its time, a share of the duration."""
+    left = body.standing_ankle("L")
 
     def plan(point: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
-        leg = read(point)
-        if leg.lift is None:
-            height = 0 if flight is None else flight.slope * leg.right_to
-            foot = right._replace(position=right.position + vertcat(leg.right_to, 0, height))
-        elif flight is not None:
-            foot = flight.swing(leg.right_from, leg.right_to, right_y, right_z, leg.lift, leg.duration, phase)
-        else:
-            foot = swing_foot(
-                leg.right_from, leg.right_to, right_y, right_z, leg.lift, leg.duration, phase, leg.landing_m_s
-            )
-        hip, angles = interpolate_states(leg.start, leg.end, leg.duration, phase)
-        return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": foot}, point[REACH_MARGIN], ops)
+        motion = read(point, phase)
+        hip, angles = interpolate_states(motion.start, motion.end, motion.duration, phase)
+        turned = {**body.cycle_angles(angles), **motion.turns}
+        return body.plan(hip, turned, {"L": left, "R": motion.foot}, point[REACH_MARGIN], ops)
 
     return plan
 

@@ -16,12 +16,12 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, NumericPoint, Parameter, Point
 from nlp_gait.formulation.assembly import Variable, make_parameters
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body, Support
-from nlp_gait.gaits.biped.cycle_motion import interpolate_states, make_cycle_variables
+from nlp_gait.gaits.biped.cycle_motion import PhaseMotion, make_cycle_variables, make_planner
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides, list_feet, list_swings
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, RowsAndIndexes
+from nlp_gait.gaits.biped.limits import BalanceMargins, Margins, RowsAndIndexes
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.samples import Instant, Planner
+from nlp_gait.gaits.biped.samples import Planner
 from nlp_gait.gaits.biped.sequence import End, MotionSection
 from nlp_gait.gaits.biped.support_phases import compute_sole_margins, limit_to_sole
 from nlp_gait.gaits.biped.switch import SWITCHES, read_state
@@ -153,11 +153,10 @@ def make_polygon_margins(sides: Array) -> Margins:
 
 def make_footstep_planner(body: Body, turning: bool, swings: bool) -> Planner:
     """Return the plan of a phase over the left foot: the right one swings straight to its foothold, or stands on it."""
-    left, (_, height) = body.standing_ankle("L"), body.ankle("R")
+    _, height = body.ankle("R")
 
-    def plan(point: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+    def read(point: InstantPoint, phase: SX) -> PhaseMotion:
         begin, end = (read_state(point, name, body.coordinates) for name in ("begin", "end"))
-        hip, angles = interpolate_states(begin, end, point[DURATION], phase)
         share, rise = constant_motion(1.0), constant_motion(0.0)
         if swings:
             share = cubic(SX(0), SX(1), SX(0), SX(0), point[DURATION], phase)
@@ -169,9 +168,9 @@ def make_footstep_planner(body: Body, turning: bool, swings: bool) -> Planner:
         )
         foot = stack(x, y, rise._replace(position=rise.position + height))
         turns = {TORSO_YAW: Motion(*(order / 2 for order in yaw)), RIGHT_YAW: yaw} if turning else {}
-        return body.plan(hip, {**body.cycle_angles(angles), **turns}, {"L": left, "R": foot}, point[REACH_MARGIN], ops)
+        return PhaseMotion(begin, end, point[DURATION], foot, turns)
 
-    return plan
+    return make_planner(body, read)
 
 
 def make_footstep_variables(body: Body, steps: int) -> tuple[Variable, ...]:

@@ -35,16 +35,15 @@ class Goal:
     figure: Callable[[Samples], MX] | None = None  # of the samples; None for power
     heat: Parameter = HEAT_LOSS  # parameter K with the robot's default
 
-    def evaluate(self, point: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX], Mapping[str, MX]]:
-        """Return the objective, and the indexes before and after those of the limits."""
+    def evaluate(self, point: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX]]:
+        """Return the objective and the indexes: power, and what is minimised instead, or the power of the paper's motors."""
         if self.figure is not None:
             figure = self.figure(samples)
-            return figure, {"power_W": compute_paper_power(point, samples, Exact())}, {self.objective.name: figure}
+            return figure, {"power_W": compute_paper_power(point, samples, Exact()), self.objective.name: figure}
         power = self.power(point, samples, ops)
-        paper = (
-            {} if self.power is compute_paper_power else {"paper_power_W": compute_paper_power(point, samples, Exact())}
-        )
-        return power, {"power_W": power}, paper
+        if self.power is compute_paper_power:
+            return power, {"power_W": power}
+        return power, {"power_W": power, "paper_power_W": compute_paper_power(point, samples, Exact())}
 
 
 def _average_squared_rate(values: MX, samples: Samples) -> MX:

@@ -115,12 +115,11 @@ class Phase:
         """Return the rows of all limits, the goal, and the indexes of both; by default at all samples."""
         samples = self.sample(point, ops) if samples is None else samples
         added = [limit.add(point, samples, ops) for limit in self.every_limit]
-        value, before, after = self.goal.evaluate(point, samples, ops)
-        indexes = {name: index for _, limit_indexes in added for name, index in limit_indexes.items()}
+        value, indexes = self.goal.evaluate(point, samples, ops)
         return Assembly(
             objective=value,
             constraints=tuple(row for rows, _ in added for row in rows),
-            indexes={**before, **indexes, **after},
+            indexes={**indexes, **{name: index for _, of_limit in added for name, index in of_limit.items()}},
         )
 
     def sample(self, point: Point, ops: Nonsmooth, phases: MX | None = None) -> Samples:

@@ -12,7 +12,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from casadi import MX
+from casadi import MX, SX
 
 from nlp_gait.errors import check_count
 from nlp_gait.formulation import (
@@ -40,7 +40,7 @@ from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_goal, make_phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
 from nlp_gait.gaits.biped.sequence import CYCLE, End, MotionSection, Sequence
-from nlp_gait.gaits.biped.support_phases import limit_to_box, make_support_box
+from nlp_gait.gaits.biped.support_phases import limit_to_box, make_support_box, swing_foot
 from nlp_gait.gaits.biped.switch import read_state
 from nlp_gait.gaits.biped.walk_sections import (
     DURATION,
@@ -206,13 +206,18 @@ def _raise_lift(variable: Variable, body: Body, flight: Flight) -> Variable:
 
 def plan_whole_walk(body: Body, steps: int, grid: Grid, flight: Flight | None = None) -> GaitProblem:
     """Return the problem of a whole walk of least energy per metre, up a flight of stairs if it is given."""
+    swing, slope = (swing_foot, 0.0) if flight is None else (flight.swing, flight.slope)
 
-    def read(point: InstantPoint, swings: bool) -> PhaseMotion:
+    def read(point: InstantPoint, phase: SX, swings: bool) -> PhaseMotion:
         begin, end = (read_state(point, name, body.coordinates) for name in ("begin", "end"))
-        return PhaseMotion(begin, end, point[DURATION], point[RIGHT_FROM], point[STEP], point[LIFT] if swings else None)
+        step, duration = point[STEP], point[DURATION]
+        foot = body.standing_ankle("R", step, slope * step)
+        if swings:
+            foot = swing(point[RIGHT_FROM], step, *body.ankle("R"), point[LIFT], duration, phase)
+        return PhaseMotion(begin, end, duration, foot)
 
     steps = check_count("steps", steps, at_least=HALF_STEPS, at_most=MOST_STEPS)
-    planners = [make_planner(body, partial(read, swings=swings), flight) for swings in (False, True)]
+    planners = [make_planner(body, partial(read, swings=swings)) for swings in (False, True)]
     phases = make_walk_phases(body, make_phase_variables(body), planners, grid, make_divided_loads(body, "lever"))
     variables = make_walk_variables(body, steps)
     walk = WholeWalk(

@@ -10,7 +10,7 @@ from casadi import DM, MX, SX, fmax, vertcat, vertsplit
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import InstantPoint, Point
 from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
-from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, Support
+from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, Support, ZmpGravity, ZmpMasses
 from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.motors import Motors, parse_features
@@ -23,8 +23,6 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
 
 Arms = Literal["carried", "separate", "shared", "held"]
-ZmpGravity = Literal["physical", "printed"]
-ZmpMasses = Literal[25, 23]
 
 GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
 

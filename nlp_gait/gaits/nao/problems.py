@@ -6,10 +6,11 @@ from typing import Any
 
 from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.formulation.power_form import PowerForm
+from nlp_gait.gaits.biped.body import ZmpGravity, ZmpMasses
 from nlp_gait.gaits.biped.loads import Division
 from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.problems import LoadOptions, MotorOptions, PhaseOptions, RobotOptions, make_support_problem
-from nlp_gait.gaits.nao.body import Arms, NaoBody, ZmpGravity, ZmpMasses, make_nao
+from nlp_gait.gaits.nao.body import Arms, NaoBody, make_nao
 
 STEP_M = 0.06
 # Options of the phases that have formulas for proofs, with one sample in each interval.
