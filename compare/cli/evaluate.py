@@ -26,7 +26,6 @@ from nlp_gait.robots import load_robot
 
 if TYPE_CHECKING:
     from compare.questions.recorded import JudgedGait
-    from nlp_gait.gaits.nao.recorded import RecordedGait
 
 SHOWN_VIOLATIONS = 10
 X = "Decision variables in order, separated by commas; or a .csv file with one candidate per row."
@@ -66,7 +65,7 @@ def evaluate(
     if rounded and motion is not None:
         fail("--rounded refers to the digits of --x; leave it out for a motion")
     if motion is not None and x is None:
-        return _evaluate_motion(_read_motion(problem, motion, touch_down), engine, signals)
+        return _evaluate_motion(problem, motion, touch_down, engine, signals)
     if x is None or motion is not None:
         fail("give a point with --x, or a motion with --motion")
     loaded = problem.spec().load()
@@ -110,8 +109,11 @@ def _evaluate_rounded(problem: GaitProblem, x: str, claimed: str | None) -> Outp
     return Output(data=verdict.to_json(), parts=parts)
 
 
-def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) -> RecordedGait:
-    """Read a gait from joint angles, with changed limits; InputError for a file without a gait, or an option without effect."""
+def _evaluate_motion(
+    problem: AnyProblem, motion: Path, touch_down_s: float | None, engine: bool, signals: Path | None
+) -> Output:
+    """Judge a gait from joint angles, with changed limits; InputError for a file without a gait, or an option without effect."""
+    from compare.questions.recorded import judge_gait
     from nlp_gait.gaits.nao.recorded import GAITS, make_recorded_gait
 
     robot, values = problem.robot or "nao-v5", dict(parse_pairs(problem.values, "--set"))
@@ -124,12 +126,7 @@ def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) 
         **({} if intervals is None else parse_options(name, [("intervals", intervals)])),
     )
     numbers = {key: parse_number(key, text, "--set") for key, text in values.items()}
-    return replace(gait, problem=gait.problem.with_values(**numbers))
-
-
-def _evaluate_motion(gait: RecordedGait, engine: bool, signals: Path | None) -> Output:
-    from compare.questions.recorded import judge_gait
-
+    gait = replace(gait, problem=gait.problem.with_values(**numbers))
     judged = judge_gait(gait, in_engine=engine)
     if signals is not None:
         write_npz(signals, gait.problem.signals(gait.x))

@@ -1,6 +1,6 @@
 """Commands that answer a question about a problem: how certain its optimum is, and how it changes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +13,7 @@ from compare.cli.printing import Output, Rows, describe_command, say, show_progr
 from compare.questions.certainty import Certainty, search_point
 from compare.questions.pareto.pareto import Pareto, parse_searches
 from compare.questions.prices import Prices
-from compare.questions.question import Answer, Question, Work
+from compare.questions.question import Question, Work
 from compare.questions.robust import Robust
 from compare.questions.sweep import Sweep, parse_axis
 from compare.questions.variants import MOTORS, PROBLEM, Variant, Variants, list_trajectories
@@ -229,7 +229,10 @@ def sweep(
 
 
 def run_question(question: Question[Any], out: Path) -> Output:
-    """Answer a question, continuing from the results stored in the folder; also from partial findings after Ctrl-C."""
+    """Answer a question, continuing from the results stored in the folder; also from partial findings after Ctrl-C.
+
+    The output has sentences and tables, without those for other programs, also if the answer cannot be written.
+    """
     findings, stopped, notes = None, "", 0
     with show_progress(question.counts, question.total) as advance:
 
@@ -247,16 +250,7 @@ def run_question(question: Question[Any], out: Path) -> Output:
             stopped = str(interrupt) or f"interrupted{done}"
     if findings is None:
         return Output(data={}, interrupted=f"{stopped}; {describe_stored(out)}")
-    answer, failures = question.add_best_known(findings), question.failures(findings)
-    output = write_answer(answer, out, stopped, [identify_problem(question.problem)])
-    return replace(output, failures=[*output.failures, *(["; ".join(failures)] if failures else [])])
-
-
-def write_answer(answer: Answer, out: Path, stopped: str = "", problems: Sequence[Mapping[str, Any]] = ()) -> Output:
-    """Write an answer, citing the sources of problems; one that cannot be written is handed out nevertheless.
-
-    The output has sentences and tables, without those for other programs.
-    """
+    answer, problems = question.add_best_known(findings), [identify_problem(question.problem)]
     written, failures = list[Path](), list[str]()
     with defer_interrupts() as pressed:
         try:
@@ -265,16 +259,12 @@ def write_answer(answer: Answer, out: Path, stopped: str = "", problems: Sequenc
             failures.append(str(error))
     if pressed() and not stopped:
         stopped = "interrupted at the end"
+    failures += filter(None, ["; ".join(question.failures(findings))])
     parts: list[str | Rows] = [answer.title, *answer.headline]
     for block in iterate_leaves(answer.parts):
         if isinstance(block, str):
             parts.append(block)
         elif isinstance(block, Table) and not block.name:
             parts.append(Rows(block.caption, tuple(block.columns), block.cells))
-    return Output(
-        data=answer.data,
-        parts=parts,
-        written=written,
-        failures=failures,
-        interrupted=f"{stopped}; the results are in {out}; {CONTINUE}" if stopped else "",
-    )
+    interrupted = f"{stopped}; the results are in {out}; {CONTINUE}" if stopped else ""
+    return Output(data=answer.data, parts=parts, written=written, failures=failures, interrupted=interrupted)

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -47,7 +47,7 @@ class Reference:
 class Shipped:
     """A shipped value."""
 
-    problem: StoredProblem
+    problem: Mapping[str, Any]  # as ``identify_problem`` describes it
     objective: float  # in the problem's sense
     x: tuple[float, ...]  # (n,) its point; its total violation is at most the judge's tolerance
     found_by: str  # solvers and their number of runs, in words
@@ -63,11 +63,6 @@ def load_shipped() -> tuple[Shipped, ...]:
     return tuple(decode(Shipped, item) for item in raw)
 
 
-@cache
-def _list_shipped() -> tuple[tuple[Shipped, Mapping[str, Any]], ...]:
-    return tuple((entry, asdict(entry.problem)) for entry in load_shipped())
-
-
 def find_reference(problem: Mapping[str, Any]) -> Reference:
     """Return the reference of a problem as ``identify_problem`` describes it; without a shipped value, one that says so.
 
@@ -75,26 +70,21 @@ def find_reference(problem: Mapping[str, Any]) -> Reference:
     """
     if PROBES not in problem and problem.get("name") in PROBLEMS:
         problem = _identify(json.dumps(problem, sort_keys=True))
-    differences = [(entry, describe_difference(stored, problem)) for entry, stored in _list_shipped()]
+    differences = [(entry, describe_difference(entry.problem, problem)) for entry in load_shipped()]
     shipped = next((entry for entry, difference in differences if not difference), None)
     if shipped is None:
         if generated := _find_generated(str(problem.get("options", {}).get("instance", "")), problem):
             return generated
         names = ("name", "options", "parameters")
-        same = [why for entry, why in differences if all(getattr(entry.problem, n) == problem.get(n) for n in names)]
-        known = any(entry.problem.name == problem.get("name") for entry in load_shipped())
+        same = [why for entry, why in differences if all(entry.problem[n] == problem.get(n) for n in names)]
+        known = any(entry.problem["name"] == problem.get("name") for entry in load_shipped())
         if same:
             return Reference(source=f"{OWN}; the shipped value is not used, for the problem has changed: {same[0]}")
         return Reference(source=f"{OWN}; none is shipped for {'these settings' if known else 'this problem'}")
-    return Reference(
-        proven_as=shipped.proven_as,
-        objective=shipped.objective,
-        x=shipped.x,
-        bound=shipped.bound,
-        source=f"shipped, best of {shipped.found_by}"
-        if shipped.bound is None
-        else f"shipped, proven to {describe_gap(shipped.bound, shipped.objective)}",
-    )
+    objective, bound = shipped.objective, shipped.bound
+    evidence = f"best of {shipped.found_by}" if bound is None else f"proven to {describe_gap(bound, objective)}"
+    source = f"shipped, {evidence}"
+    return Reference(objective=objective, x=shipped.x, bound=bound, source=source, proven_as=shipped.proven_as)
 
 
 @cache

@@ -1,7 +1,6 @@
 """Shipped best known values: each is found by its problem, follows from its point, and has the bound of its certificate."""
 
 import copy
-from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ def test_every_shipped_value_has_the_bound_of_its_tightest_certificate() -> None
     """Else run ``python -m benchmarks.best_known``."""
     certificates, named = load_certificates(), set[str]()
     for entry in load_shipped():
-        proof = find_certificate(asdict(entry.problem)) or certificates.get(entry.proven_as)
+        proof = find_certificate(entry.problem) or certificates.get(entry.proven_as)
         assert entry.bound == (proof and proof.certificate.bound)
         if proof is not None:
             named.add(entry.proven_as)
@@ -32,8 +31,8 @@ def test_every_shipped_value_has_the_bound_of_its_tightest_certificate() -> None
 def test_a_shipped_value_is_of_its_problem(number: int) -> None:
     entry = load_shipped()[number]
     stored = entry.problem
-    problem = nlp_gait.load(stored.name, **stored.options).with_values(**stored.parameters)
-    assert describe_difference(asdict(stored), identify_problem(problem)) == ""
+    problem = nlp_gait.load(stored["name"], **stored["options"]).with_values(**stored["parameters"])
+    assert describe_difference(stored, identify_problem(problem)) == ""
     values = build_exact_model(problem).at(entry.x, problem.p)
     assert problem.objective.sign * values.cost == pytest.approx(entry.objective, rel=1e-9)
     assert values.violation <= FEASIBILITY_TOLERANCE
@@ -64,7 +63,8 @@ def test_a_certificate_in_another_form_is_of_the_same_problem(id: str) -> None:
 
 
 def test_the_suite_and_the_shipped_values_agree() -> None:
-    by_instance = {str(s.problem.options["instance"]): s for s in load_shipped() if "instance" in s.problem.options}
+    options = [(entry, entry.problem["options"]) for entry in load_shipped()]
+    by_instance = {str(chosen["instance"]): entry for entry, chosen in options if "instance" in chosen}
     for id, facts in load_facts().items():
         assert abs(by_instance[id].objective) == pytest.approx(abs(facts.best_known), rel=2e-6), id
 
