@@ -11,7 +11,7 @@ from compare.cli.command import OUTPUT, OUTPUT_FILE, command
 from compare.cli.compare import describe_summaries, list_excluded, summarise_problems
 from compare.cli.options import RESULTS, Code, NamedProblem, name_all, parse_number
 from compare.cli.printing import Output, show_progress
-from compare.report import write_report
+from compare.report import renew_report, write_report
 from compare.study.evidence import read_evidence
 from compare.study.import_runs import import_runs
 from compare.study.record_files import write_records
@@ -41,8 +41,7 @@ def import_results(
     spec = problem.spec()
     records = import_runs(spec, finals, label, history, evaluations)
     kept = write_records(records, out)
-    evidence = read_evidence(out)
-    report = write_report(out, evidence.records, read_manifest(out), excluded=evidence.excluded)
+    evidence, report = renew_report(out)
     shown = compare_problems([record for record in evidence.records if record.problem == spec.title])
     return Output(
         data={"problems": summarise_problems(shown)},

@@ -14,9 +14,7 @@ from compare.cli.printing import Output, describe_command, say, show_progress
 from compare.logs import write_ioh
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.papers.paper_runs import Runner
-from compare.report import FurtherFiles, watch_report, write_report
-from compare.study.evidence import read_evidence
-from compare.study.settings import read_manifest
+from compare.report import FurtherFiles, renew_report, watch_report
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
 
@@ -56,23 +54,16 @@ def report(
     name_all(code)
     if watch:
         say(f"open {folder / 'report.html'}; it follows the study in {folder} until Ctrl-C")
-        watch_report(folder, lambda: _rewrite(folder))
-    evidence, manifest = read_evidence(folder), read_manifest(folder)
-    records = evidence.records
+        watch_report(folder, lambda: renew_report(folder))
     further = FurtherFiles(csv=csv, latex=latex or digits is not None, decimals=digits, figures=figures)
-    written = write_report(folder, records, manifest, excluded=evidence.excluded, further=further)
+    evidence, written = renew_report(folder, further)
     if logs:
-        comparisons = compare_problems(records)
+        comparisons = compare_problems(evidence.records)
         for sentence in (s for comparison in comparisons for s in describe_unknown(comparison)):
             say(f"not in the logs: {sentence}")
         write_ioh(comparisons, folder / "logs")
         written.append(folder / "logs")
     return Output(data={"excluded": evidence.sentences}, written=written, failures=list_excluded(evidence.sentences))
-
-
-def _rewrite(folder: Path) -> None:
-    evidence = read_evidence(folder)
-    write_report(folder, evidence.records, read_manifest(folder), excluded=evidence.excluded)
 
 
 @command

@@ -24,10 +24,10 @@ from compare.report.study_sections import (
     make_settings_section,
 )
 from compare.report.writing import write_document
-from compare.study.evidence import Exclusion
+from compare.study.evidence import CheckedRecords, Exclusion, read_evidence
 from compare.study.record import RunRecord, load_gait
 from compare.study.record_files import RECORDS, name_group
-from compare.study.settings import Manifest
+from compare.study.settings import Manifest, read_manifest
 from nlp_gait.files import make_file_name, replace_nan, write_json, write_text
 
 REPORT_ALONE = FurtherFiles()
@@ -49,6 +49,12 @@ def write_report(
         document = make_study_document(comparisons, manifest, excluded)
         written = write_document(folder, document)
         return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons, document)]
+
+
+def renew_report(folder: Path, further: FurtherFiles = REPORT_ALONE) -> tuple[CheckedRecords, list[Path]]:
+    """Check the records of a folder, write its report, and return both; raises as ``read_evidence``."""
+    evidence, manifest = read_evidence(folder), read_manifest(folder)
+    return evidence, write_report(folder, evidence.records, manifest, excluded=evidence.excluded, further=further)
 
 
 def watch_report(folder: Path, rewrite: Callable[[], object], sleep: Callable[[float], None] = time.sleep) -> None:
