@@ -253,9 +253,9 @@ def minimize(
         SearchError: An argument is not allowed, or the objective answers with wrong shapes.
         Interrupted: Ctrl-C after at least one generation; carries the partial result.
     """
-    if stop is not None and not isinstance(stop, EarlyStop):
+    handling, stop = Deb() if handling is None else handling, EarlyStop() if stop is None else stop
+    if not isinstance(stop, EarlyStop):
         raise SearchError(f"stop must be made by EarlyStop(...), or None, got {abbreviate(stop)}")
-    handling = Deb() if handling is None else handling
     preparation.check_budget(algorithm, evaluations)
     preparation.check_helpers(handling, callback)
     sequence = preparation.seed_sequence(seed)
@@ -264,12 +264,7 @@ def minimize(
     # A search that calls the objective evaluates point by point.
     record = Evaluator(objective, callback, thinned=isinstance(search, CallingSearch))
     run = _Run(
-        record=record,
-        algorithm=algorithm,
-        evaluations=evaluations,
-        handling=handling,
-        stop=EarlyStop() if stop is None else stop,
-        sequence=sequence,
+        record=record, algorithm=algorithm, evaluations=evaluations, handling=handling, stop=stop, sequence=sequence
     )
     try:
         with limit_blas_threads(algorithm, objective), suppress(Ended):

@@ -129,10 +129,7 @@ def compare(
     if config is not None:
         settings = read_settings(config)
     elif resume:
-        known = read_manifest(out).settings
-        if known is None:
-            raise InputError(f"{str(out)!r} contains no study to resume (study.json); omit --resume to start one")
-        settings = resolve_user_code(known, f"the study in {str(out)!r}")
+        settings = read_interrupted_study(out)
     else:
         specs = [changes.make_spec(name) for name in problems or DEFAULT_PROBLEMS]
         settings = searches.make_study(specs, algorithms, starts)
@@ -155,6 +152,14 @@ def compare(
         answer=write_headlines(comparisons),
         failures=[*list_excluded(imported.sentences), *([remedy] if lost else [])],
     )
+
+
+def read_interrupted_study(out: Path) -> StudySettings:
+    """Return the study in a folder; raises InputError if there is none."""
+    settings = read_manifest(out).settings
+    if settings is None:
+        raise InputError(f"{str(out)!r} contains no study to resume (study.json); omit --resume to start one")
+    return resolve_user_code(settings, f"the study in {str(out)!r}")
 
 
 def run_in_folder(

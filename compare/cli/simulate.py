@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from typer import Option
@@ -20,9 +20,12 @@ from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_
 from nlp_gait.simulation.video import Frame, check_frames, check_video_path, write_video
 
 if TYPE_CHECKING:
+    from nlp_gait.formulation import Signals
+    from nlp_gait.formulation.display import Skeleton
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.measurements import ClimbMeasurements, Measurements, Walk
-    from nlp_gait.simulation.simulate import Conditions, Push, Run
+    from nlp_gait.simulation.plan import Plan
+    from nlp_gait.simulation.simulate import Conditions, Push, Run, Simulation
 
 DRIVE = (
     "feed-forward: set-points every 10 ms, linear between them, planned velocity and torque fed forward. held: each held for "
@@ -108,11 +111,7 @@ def simulate(
     page: Annotated[
         Path | None, Option(metavar="FILE.html", help="Page that plays the simulation in 3-D."), OUTPUT_FILE
     ] = None,
-    video: Annotated[
-        Path | None,
-        Option(help="Film it to this .gif file; needs OpenGL."),
-        OUTPUT_FILE,
-    ] = None,
+    video: Annotated[Path | None, Option(help="Film it to this .gif file; needs OpenGL."), OUTPUT_FILE] = None,
     live: Annotated[bool, Option("--live", help=LIVE)] = False,
     sole: Annotated[str, Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     world: ConditionOptions,
@@ -131,11 +130,8 @@ def simulate(
     A table `[controller]` with `kp`, `kd` and `gravity_compensation` instead is a PD controller with equal gains of all joints.
     """
     from compare.drawing.robot_figures import plot_simulation
-    from compare.report.interactive import animate_simulation
-    from nlp_gait.export.formats import write_npz
     from nlp_gait.robots.loading import hold_robots
     from nlp_gait.simulation.engine import load_mujoco
-    from nlp_gait.simulation.measurements import measure, measure_climb, measure_walk
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
     from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, list_frames, make_skeleton
@@ -153,36 +149,56 @@ def simulate(
         check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
     simulation = Run(plan, conditions, drive, sole)
     pushes, failures = _watch(simulation) if live else ([], [])
-    trace = simulation.finish()
-    written = [path for path in (page, video) if path is not None]
+    trace, written = simulation.finish(), [path for path in (page, video) if path is not None]
+    data, parts = _report(plan, trace, drive, pushes)
     model, _ = prepare(plan, conditions, drive, sole)
     if page is not None:
-        power = np.abs(trace.torque * trace.qd).sum(axis=1)[list_frames(trace)]
-        animate_simulation(make_skeleton(plan, trace, model, sole, result.problem.title), power).write(page)
+        _write_page(page, make_skeleton(plan, trace, model, sole, result.problem.title), trace)
     if video is not None:
         write_video(video, _show_pictures(draw_pictures(plan, trace, model), len(list_frames(trace))), FRAMES_PER_S)
+    if folder is not None:
+        xml = make_plan_model(plan, drive, sole, conditions.friction, conditions.bumps)
+        written += _write_report(folder, data, xml, trace.signals(plan.joints))
+        written.append(plot_simulation(plan, trace, drive, folder / "simulation.png"))
+    return Output(data=data, parts=parts, written=written, failures=failures)
+
+
+def _write_page(page: Path, skeleton: Skeleton, trace: Simulation) -> None:
+    """Write the page that plays a simulation, with the mechanical power of all joints."""
+    from compare.report.interactive import animate_simulation
+    from nlp_gait.simulation.replay import list_frames
+
+    power = np.abs(trace.torque * trace.qd).sum(axis=1)[list_frames(trace)]
+    animate_simulation(skeleton, power).write(page)
+
+
+def _write_report(folder: Path, data: dict[str, Any], model: str, histories: Signals) -> list[Path]:
+    """Write report, model and time histories of a simulation; return the files."""
+    from nlp_gait.export.formats import write_npz
+
+    report, xml, arrays = (folder / name for name in ("report.json", "model.xml", "simulation.npz"))
+    write_json(report, replace_nan(data))
+    write_text(xml, model)
+    write_npz(arrays, histories)
+    return [report, xml, arrays]
+
+
+def _report(plan: Plan, trace: Simulation, drive: Drive, pushes: list[Push]) -> tuple[dict[str, Any], list[str | Rows]]:
+    """Return what is measured in a simulation, as data and in words."""
+    from nlp_gait.simulation.measurements import measure, measure_climb, measure_walk
+
     walk = None if plan.steps is None else measure_walk(plan, trace, drive, plan.steps)
     report = measure(plan, trace, drive) if walk is None else walk.measurements
-    data = {"schema": 1, **asdict(report), "pushes": [asdict(push) for push in pushes]}
+    data, parts = {"schema": 1, **asdict(report), "pushes": [asdict(push) for push in pushes]}, [*_describe(report)]
     if walk is not None:
         data |= {"walked_m": walk.walked_m, "planned_m": walk.planned_m, "energy_J": walk.engine_J}
         data["walk"] = walk.course()
-    climb = measure_climb(plan, trace) if plan.ground else None
-    if climb is not None:
+        parts.append(_describe_course(walk, drive.feedback is None and drive.balance is None))
+    if plan.ground:
+        climb = measure_climb(plan, trace)
         data["climb"] = asdict(climb)
-    if folder is not None:
-        written += [folder / name for name in ("report.json", "model.xml", "simulation.npz")]
-        write_json(folder / "report.json", replace_nan(data))
-        write_text(folder / "model.xml", make_plan_model(plan, drive, sole, conditions.friction, conditions.bumps))
-        write_npz(folder / "simulation.npz", trace.signals(plan.joints))
-        written.append(plot_simulation(plan, trace, drive, folder / "simulation.png"))
-    parts = [
-        *_describe(report),
-        *(() if walk is None else [_describe_course(walk, drive.feedback is None and drive.balance is None)]),
-    ]
-    if climb is not None:
         parts.append(_describe_climb(climb))
-    return Output(data=data, parts=parts, written=written, failures=failures)
+    return data, parts
 
 
 def _watch(simulation: Run) -> tuple[list[Push], list[str]]:

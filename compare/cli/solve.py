@@ -1,7 +1,7 @@
 """``nlp-gait solve`` and ``nlp-gait plan``."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +16,7 @@ from compare.cli.printing import Output, Rows, fail, say, show_progress, tabulat
 from compare.study.references import find_reference
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.plan_walk import MARGINS as MARGINS_OF_SOLE
-from nlp_gait.backends.plan_walk import WalkSettings
+from nlp_gait.backends.plan_walk import WalkPlan, WalkSettings
 from nlp_gait.backends.solvers import registry
 from nlp_gait.errors import OutputError
 from nlp_gait.files import replace_nan, write_json
@@ -125,27 +125,61 @@ def _describe(solution: Solution) -> Iterator[str | Rows]:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class RouteOptions:
+    """Where a walk leads, and how fast."""
+
+    steps: Annotated[
+        int | None,
+        Option(min=2, max=1000, help="Swings of a foot, both half steps included (default: 10, or by distance)."),
+    ] = None
+    speed: Annotated[
+        float | None, Option(min=1e-3, max=1e3, help="Speed of the inner steps [m/s] (default: the cheapest).")
+    ] = None
+    speeds: Annotated[str, Option(help=SPEEDS)] = ""
+    distance: Annotated[float | None, Option(min=1e-3, max=1e6, help="Distance that the feet advance [m].")] = None
+    slope_deg: Annotated[
+        float, Option(min=-45.0, max=45.0, help="By which the ground rises forward; negative falls.")
+    ] = 0.0
+    stairs: Annotated[
+        str, Option(metavar="RISExRUN:N", help="Climb N treads of this rise and depth [m], one with each step.")
+    ] = ""
+    turn_deg: Annotated[float, Option(min=-36000.0, max=36000.0, help=TURN)] = 0.0
+    footholds: Annotated[Path | None, Option(help=FOOTHOLDS)] = None
+
+    def plan(self, robot: str, settings: WalkSettings) -> WalkPlan:
+        """Return the walk of a robot; raises as ``plan_walk``."""
+        if self.turn_deg or self.footholds is not None or self.speeds:
+            if (self.speed, self.stairs, self.slope_deg) != (None, "", 0.0):
+                fail("a walk whose steps differ is on a level floor; leave out --speed, --slope-deg and --stairs")
+            return nlp_gait.plan_route(
+                robot,
+                footholds=self.footholds,
+                turn_deg=self.turn_deg,
+                steps=self.steps,
+                distance_m=self.distance,
+                speeds_m_s=[options.parse_number("speed", v, "--speeds") for v in options.parse_names(self.speeds)],
+                settings=settings,
+            )
+        if self.stairs:
+            if (self.steps, self.distance, self.slope_deg) != (None, None, 0.0):
+                fail("stairs determine steps and distance and are level; leave out --steps, --distance and --slope-deg")
+            return nlp_gait.plan_climb(robot, self.stairs, speed_m_s=self.speed, settings=settings)
+        return nlp_gait.plan_walk(
+            robot,
+            self.steps,
+            speed_m_s=self.speed,
+            distance_m=self.distance,
+            slope_deg=self.slope_deg,
+            settings=settings,
+        )
+
+
 @command
 def plan(
     *,
     robot: Annotated[str, Option(help=options.ROBOT)] = "nao-v5",
-    steps: Annotated[
-        int | None,
-        Option(min=2, max=1000, help="Swings of a foot, both half steps included (default: 10, or by distance)."),
-    ] = None,
-    speed: Annotated[
-        float | None, Option(min=1e-3, max=1e3, help="Speed of the inner steps [m/s] (default: the cheapest).")
-    ] = None,
-    speeds: Annotated[str, Option(help=SPEEDS)] = "",
-    distance: Annotated[float | None, Option(min=1e-3, max=1e6, help="Distance that the feet advance [m].")] = None,
-    slope_deg: Annotated[
-        float, Option(min=-45.0, max=45.0, help="By which the ground rises forward; negative falls.")
-    ] = 0.0,
-    stairs: Annotated[
-        str, Option(metavar="RISExRUN:N", help="Climb N treads of this rise and depth [m], one with each step.")
-    ] = "",
-    turn_deg: Annotated[float, Option(min=-36000.0, max=36000.0, help=TURN)] = 0.0,
-    footholds: Annotated[Path | None, Option(help=FOOTHOLDS)] = None,
+    route: RouteOptions,
     margins: Annotated[str | None, Option(metavar="ALONG,ACROSS", help=MARGINS)] = None,
     values: Annotated[list[str] | None, Option("--set", metavar="NAME=VALUE", help=OF_A_WALK)] = None,
     limits: options.Limits = None,
@@ -163,26 +197,7 @@ def plan(
     of_phases = options.parse_options("nao-walk", pairs)
     least = None if margins is None else options.parse_numbers("a margin", margins, "--margins")
     settings = WalkSettings(values=numbers, margins=least, starts=starts, progress=say, **of_phases)
-    if turn_deg or footholds is not None or speeds:
-        if (speed, stairs, slope_deg) != (None, "", 0.0):
-            fail("a walk whose steps differ is on a level floor; leave out --speed, --slope-deg and --stairs")
-        walk = nlp_gait.plan_route(
-            robot,
-            footholds=footholds,
-            turn_deg=turn_deg,
-            steps=steps,
-            distance_m=distance,
-            speeds_m_s=[options.parse_number("speed", word, "--speeds") for word in options.parse_names(speeds)],
-            settings=settings,
-        )
-    elif stairs:
-        if (steps, distance, slope_deg) != (None, None, 0.0):
-            fail("stairs determine steps and distance and are level; leave out --steps, --distance and --slope-deg")
-        walk = nlp_gait.plan_climb(robot, stairs, speed_m_s=speed, settings=settings)
-    else:
-        walk = nlp_gait.plan_walk(
-            robot, steps, speed_m_s=speed, distance_m=distance, slope_deg=slope_deg, settings=settings
-        )
+    walk = route.plan(robot, settings)
     if out is not None:
         walk.save(out)
     step = walk.solution.x.get("step_length_m")

@@ -1,7 +1,7 @@
 """Results from elsewhere as records of a study: judged like all others; unknown values stay unknown."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -76,7 +76,7 @@ def import_runs(
     runs = [table.count("run", k, v) for k, v in enumerate(given["run"] or range(len(points)))]
     if len(set(runs)) < len(runs):
         raise InputError(f"{table.owner}: a run is duplicated")
-    known = {} if histories is None else _read_histories(histories, runs)
+    stored = {} if histories is None else _read_histories(histories, runs)
     identity = identify_problem(problem)
     records = []
     for k, (run, x) in enumerate(zip(runs, points, strict=True)):
@@ -84,13 +84,7 @@ def import_runs(
         verdict = Verdict.from_evaluation(evaluate(problem, x))
         for name, least in LEAST.items():
             table.number(name, k, row[name], least)
-        history, seconds = known.get(run, (History(), ()))
-        count = math.nan if evaluations is None else evaluations
-        count = count if math.isnan(row["evaluations"]) else row["evaluations"]
-        if run not in known and not math.isnan(count):
-            end = verdict.objective if verdict.feasible else None
-            history = History(evaluations=(table.count("evaluations", k, count, 1),), objective=(end,))
-            seconds = (row["time_s"],)
+        history, seconds = stored.get(run) or _make_history(table, k, row, verdict, evaluations)
         solve = (time for time in (row["time_s"], *seconds[-1:]) if not math.isnan(time))
         claim = None if math.isnan(row["objective"]) else row["objective"]
         seed = run if math.isnan(row["seed"]) else table.count("seed", k, row["seed"])
@@ -121,6 +115,19 @@ def import_runs(
             )
         )
     return records
+
+
+def _make_history(
+    table: CsvTable, k: int, row: Mapping[str, float], verdict: Verdict, evaluations: int | None
+) -> tuple[History, tuple[float, ...]]:
+    """Return the end of a run alone as its history and its time; empty if the number of evaluations is unknown."""
+    count = row["evaluations"]
+    if math.isnan(count):
+        if evaluations is None:
+            return History(), ()
+        count = evaluations
+    end = verdict.objective if verdict.feasible else None
+    return History(evaluations=(table.count("evaluations", k, count, 1),), objective=(end,)), (row["time_s"],)
 
 
 def _read_histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tuple[float, ...]]]:
