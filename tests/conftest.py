@@ -87,6 +87,19 @@ def coarse_pictures() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def one_core() -> Iterator[None]:
+    """Compute in this process alone: each fork would build again what this process has built already."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    usual = os.sched_getaffinity(0)
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    os.sched_setaffinity(0, {sorted(usual)[worker % len(usual)]})
+    yield
+    os.sched_setaffinity(0, usual)
+
+
 @pytest.fixture
 def without_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let no compiler be found; Zig's is a package, not a program of the path."""

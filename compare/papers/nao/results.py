@@ -55,7 +55,7 @@ class NaoEffort(Effort):
     """Effort of the reproduction; what does not depend on runs of the searches is the same in each."""
 
     evaluations: int = 10_000  # of a search, as in the paper
-    starts: int = 3  # of IPOPT at each optimum, and two for each point of a sweep
+    starts: int = 3  # of IPOPT at each optimum from random points, and at most one for each point of a sweep
 
 
 # Variables in the problem's order, and figures, of each printed solution
@@ -134,12 +134,12 @@ def _make_start_tasks(effort: NaoEffort) -> Iterator[Task]:
             yield from _start_from_print(make_spec(phase, reading), phase, effort.starts)
         for what, phase in SWEEPS:
             for spec in list_sweep(reading, what, phase):
-                yield from _start_from_print(spec, phase, 1)
+                yield from _start_from_print(spec, phase, min(effort.starts, 1))
     for share, arms in SHARES:
         spec = make_spec("dsp", "printed", f"-{share}-{arms}", torso_share=share, arms=arms)
         mean = evaluate_point(spec, PRINTED_X["dsp", "PSO"])["dbm_y_mean_m"]
         spec = fix(replace(spec, values={"dbm_y_mean_limit_m": mean}), **{"hip_height_m": 0.31, TIMES["dsp"]: 2.0})
-        yield from _start_from_print(spec, "dsp", 1)
+        yield from _start_from_print(spec, "dsp", min(effort.starts, 1))
 
 
 def _start_from_print(spec: ProblemSpec, phase: str, random: int) -> Iterator[Task]:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,8 @@ from docs.pages.papers import RECORDS, paper_page
 from nlp_gait.errors import OutputError
 
 Quick = Callable[[str], tuple[Path, dict[str, Any]]]
+# IPOPT's starts from printed solutions alone: they are the ones that decide.
+FEWER = {"nao": {"starts": 0}}
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +29,7 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Quick:
     @cache
     def reproduce(name: str) -> tuple[Path, dict[str, Any]]:
         folder, paper = tmp_path_factory.mktemp(name), load_reproduction(name)
-        return folder, paper.reproduce(Runner(folder=folder, jobs=1), paper.quick)
+        return folder, paper.reproduce(Runner(folder=folder, jobs=1), replace(paper.quick, **FEWER.get(name, {})))
 
     return reproduce
 
