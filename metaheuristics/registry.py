@@ -85,11 +85,11 @@ def make_by_name(kind: str, name: str, factories: Mapping[str, Callable[..., T]]
     if name not in factories:
         raise SearchError(f"unknown {kind} {name!r}; {_suggest(name, factories)}")
     factory = factories[name]
-    known = inspect.signature(factory).parameters
+    parameters = inspect.signature(factory).parameters
     for setting in settings:
-        if setting not in known:
-            raise SearchError(f"{kind} {name!r} has no setting {setting!r}; {_suggest(setting, known)}")
-    for setting, parameter in known.items():
+        if setting not in parameters:
+            raise SearchError(f"{kind} {name!r} has no setting {setting!r}; {_suggest(setting, parameters)}")
+    for setting, parameter in parameters.items():
         if parameter.default is parameter.empty and setting not in settings:
             raise SearchError(f"{kind} {name!r} needs a value for {setting!r}")
     return factory(**settings)

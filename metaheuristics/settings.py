@@ -39,8 +39,8 @@ def list_ranges(settings: object) -> dict[str, Range]:
     Raises:
         SearchError: a range is neither two finite numbers, ascending, nor texts.
     """
-    known = fields(settings) if is_dataclass(settings) and not isinstance(settings, type) else ()
-    ranges = {entry.name: entry.metadata[RANGE] for entry in known if RANGE in entry.metadata}
+    settings_fields = fields(settings) if is_dataclass(settings) and not isinstance(settings, type) else ()
+    ranges = {entry.name: entry.metadata[RANGE] for entry in settings_fields if RANGE in entry.metadata}
     ranges |= getattr(settings, "ranges", {})
     for name, within in ranges.items():
         low, high, *scale = within if len(within) > 1 else (math.nan, math.nan)

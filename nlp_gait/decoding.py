@@ -38,17 +38,17 @@ def decode(
     if not isinstance(raw, Mapping):
         raise ValueError(f"{where or 'it'} must be an object, got {format_value(raw)}")
     values = dict(given or {})
-    known = {name: field for name, field in _list_fields(cls).items() if name not in values}
-    for name, (kind, needed) in known.items():
+    readable = {name: field for name, field in _list_fields(cls).items() if name not in values}
+    for name, (kind, needed) in readable.items():
         place = f"{where}.{name}" if where else name
         if name in raw:
             values[name] = decode_value(kind, raw[name], place)
         elif needed:
             raise ValueError(f"{place} is missing")
     for key in raw:
-        ignored = key in unread or (ignore_unknown and not get_close_matches(key, known, cutoff=MISSPELLED))
-        if key not in known and not ignored:
-            raise ValueError(str(unknown(f"key of {where}" if where else "key", key, known)))
+        ignored = key in unread or (ignore_unknown and not get_close_matches(key, readable, cutoff=MISSPELLED))
+        if key not in readable and not ignored:
+            raise ValueError(str(unknown(f"key of {where}" if where else "key", key, readable)))
     return cls(**values)
 
 
@@ -101,15 +101,15 @@ def decode_value(kind: Any, raw: Any, where: str) -> Any:
 def _decode_union(parts: tuple[Any, ...], raw: Any, where: str) -> Any:
     if type(raw) in parts:
         return raw
-    others = [choice for choice in parts if choice is not NoneType]
+    choices = [choice for choice in parts if choice is not NoneType]
     if all(choice in WORDS for choice in parts) and not (float in parts and type(raw) in (int, NoneType)):
         raise ValueError(f"{where} must be {' or '.join(WORDS[choice] for choice in parts)}, got {format_value(raw)}")
-    for choice in others[:-1]:
+    for choice in choices[:-1]:
         try:
             return decode_value(choice, raw, where)
         except ValueError:
             continue
-    return decode_value(others[-1], raw, where)
+    return decode_value(choices[-1], raw, where)
 
 
 def _check_type(kinds: tuple[type, ...], raw: Any, where: str, wanted: str) -> Any:

@@ -21,17 +21,17 @@ def is_zero(reference: float) -> bool:
     return abs(reference) < ZERO
 
 
-def describe_value(known: Reference, value: float | None, objective: Objective, what: str = "this point") -> str:
+def describe_value(reference: Reference, value: float | None, objective: Objective, what: str = "this point") -> str:
     """Describe the shipped best known value, and the distance of a feasible objective from it; say so if none is shipped."""
-    if known.objective is None:
-        return f"Best known value: {known.source.removeprefix(OWN)[2:]}"
-    best = f"{with_unit(known.objective, objective.unit)} ({known.source})"
+    if reference.objective is None:
+        return f"Best known value: {reference.source.removeprefix(OWN)[2:]}"
+    best = f"{with_unit(reference.objective, objective.unit)} ({reference.source})"
     if value is None:
         return f"Best known value: {best}"
-    if known.is_beaten_by(value, objective):
-        gap = -compute_gap(value, known.objective, objective)
+    if reference.is_beaten_by(value, objective):
+        gap = -compute_gap(value, reference.objective, objective)
         return (
             f"A new best known value: {100 * gap:.2g} % better than the best known {best}; please contribute the point"
         )
-    distance = format_percent(max(compute_gap(value, known.objective, objective), 0.0))
+    distance = format_percent(max(compute_gap(value, reference.objective, objective), 0.0))
     return f"Best known value: {best}; {what} is {distance} from it"

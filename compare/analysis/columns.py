@@ -149,6 +149,6 @@ def format_rows(
 ) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return header and rows of text, a row for each solver; a column in which nothing is known is left out."""
     cells = {c.title: [c.format_cell(comparison, solver) for solver in comparison.solvers] for c in columns}
-    known = {title: texts for title, texts in cells.items() if set(texts) != {"-"}}
+    nonempty = {title: texts for title, texts in cells.items() if set(texts) != {"-"}}
     names = [solver.name for solver in comparison.solvers]
-    return ("solver", *known), list(zip(names, *known.values(), strict=True))
+    return ("solver", *nonempty), list(zip(names, *nonempty.values(), strict=True))

@@ -187,5 +187,5 @@ def _make_comparison(problem: str, records: Sequence[RunRecord], reference: floa
 
 def index_solvers(comparisons: Sequence[Comparison]) -> tuple[list[dict[str, SolverRuns]], list[str]]:
     """Return the solvers of each comparison by name, and the names of those that ran on all problems."""
-    found = [{solver.name: solver for solver in comparison.solvers} for comparison in comparisons]
-    return found, [name for name in found[0] if all(name in solvers for solvers in found)] if found else []
+    by_name = [{solver.name: solver for solver in comparison.solvers} for comparison in comparisons]
+    return by_name, [name for name in by_name[0] if all(name in solvers for solvers in by_name)] if by_name else []

@@ -34,13 +34,13 @@ def write_headline(comparison: Comparison) -> str:
     optimum = f"is {best}, {_describe_proof(comparison)}"
     users = [solver for solver in comparison.solvers if solver.is_user_defined]
     if users:
-        others = [solver for solver in comparison.solvers if solver not in users]
+        package_solvers = [solver for solver in comparison.solvers if solver not in users]
         subject = join_words(_describe_user_solver(comparison, solver) for solver in users)
         first = f"On {comparison.problem} {subject}, which {optimum}."
     else:
-        others = list(comparison.solvers)
+        package_solvers = list(comparison.solvers)
         first = f"On {comparison.problem} the best {comparison.objective.name} {optimum}."
-    return " ".join(filter(None, (first, _describe_gaps(comparison, others), describe_better(comparison))))
+    return " ".join(filter(None, (first, _describe_gaps(comparison, package_solvers), describe_better(comparison))))
 
 
 def _describe_proof(comparison: Comparison) -> str:
@@ -69,8 +69,8 @@ def _describe_user_solver(comparison: Comparison, solver: SolverRuns) -> str:
     end = f"reaches {best}" if gap <= FOUND else f"ends {_format_gap(comparison, gap)} {side} {best}"
     runs = f"{len(solver.records)} runs" if len(solver.records) != 1 else "1 run"
     results = comparison.compare_with_others(solver.name)
-    found = {word: [other for other in results if results[other] == sign] for word, sign in PLACES.items()}
-    places = [f"{word} {join_words(others)}" for word, others in found.items() if others]
+    places_of_solvers = {word: [other for other in results if results[other] == sign] for word, sign in PLACES.items()}
+    places = [f"{word} {join_words(others)}" for word, others in places_of_solvers.items() if others]
     return f"{solver.name} {end} (median of {runs}{''.join(f', {place}' for place in places)})"
 
 
@@ -196,9 +196,9 @@ class LiveGaps:
         return "\n".join(f"{problem}: {_list_gaps(runs, self._known[problem])}" for problem, runs in groups)
 
 
-def _list_gaps(records: Sequence[RunRecord], known: float | None) -> str:
+def _list_gaps(records: Sequence[RunRecord], best: float | None) -> str:
     objective, runs = records[0].inputs.objective, group_by(records, lambda record: record.solver)
-    reference = find_best_known(records) if known is None else known
+    reference = find_best_known(records) if best is None else best
     gaps = {
         solver: median(compute_gap(objective.sign * record.cost, reference, objective) for record in group)
         for solver, group in runs.items()

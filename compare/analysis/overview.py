@@ -35,12 +35,12 @@ def rank_over_problems(comparisons: Sequence[Comparison]) -> Ranking:
     """Rank the solvers that ran on all problems by their medians on each, equal within the judge's tolerance."""
     from scipy.stats import friedmanchisquare, rankdata, studentized_range
 
-    found, names = index_solvers(comparisons)
+    solvers_by_name, names = index_solvers(comparisons)
     if not names:
         return Ranking(mean_ranks={}, friedman=None, critical_difference=None)
     medians = [
         [cost for (cost,) in tie([[solvers[name].median_cost] for name in names], comparison.reference)]
-        for comparison, solvers in zip(comparisons, found, strict=True)
+        for comparison, solvers in zip(comparisons, solvers_by_name, strict=True)
     ]
     ranks = rankdata(medians, axis=1)
     means = {name: float(column.mean()) for name, column in zip(names, ranks.T, strict=True)}

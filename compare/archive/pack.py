@@ -41,10 +41,10 @@ def pack_study(folder: Path, records: Sequence[RunRecord], out: Path) -> Path:
         UserCodeError: user code took part that the command does not name.
         OutputError: the archive cannot be written.
     """
-    others = (path for pattern in PARTS for path in sorted(folder.glob(pattern)) if path.is_file())
+    paths = (path for pattern in PARTS for path in sorted(folder.glob(pattern)) if path.is_file())
     content = {
         path.relative_to(folder).as_posix(): read_bytes(path, "file of the study")
-        for path in (*(locate_record(folder, record) for record in records), *others)
+        for path in (*(locate_record(folder, record) for record in records), *paths)
     }
     options = (record.inputs.problem for record in records)
     texts = {str(problem["options"][option]) for problem in options for option in problem.get(FILES, ())}
@@ -60,7 +60,7 @@ def pack_study(folder: Path, records: Sequence[RunRecord], out: Path) -> Path:
 
 def write_archive(out: Path, content: dict[str, bytes], robots: Mapping[str, str]) -> None:
     """Write files and their manifest, and check that they can be unpacked; raises as ``pack_study``."""
-    found = ArchiveManifest(
+    manifest = ArchiveManifest(
         schema=1,
         created=format_now(),
         version=version("nlp-gait"),
@@ -68,7 +68,7 @@ def write_archive(out: Path, content: dict[str, bytes], robots: Mapping[str, str
         robots=robots,
         files={name: hashlib.sha256(data).hexdigest() for name, data in content.items()},
     )
-    content[MANIFEST] = (json.dumps(asdict(found), indent=1, sort_keys=True) + "\n").encode()
+    content[MANIFEST] = (json.dumps(asdict(manifest), indent=1, sort_keys=True) + "\n").encode()
     with replace_file(out) as temporary:
         with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
             for name, data in sorted(content.items()):
@@ -123,9 +123,9 @@ def _collect_code(records: Sequence[RunRecord], content: dict[str, bytes]) -> No
 
 
 def _collect_certificates(records: Sequence[RunRecord], content: dict[str, bytes]) -> None:
-    known = {find_reference(record.inputs.problem).proven_as for record in records}
+    proven = {find_reference(record.inputs.problem).proven_as for record in records}
     for name in load_certificates():
-        if name in known:
+        if name in proven:
             content[f"certificates/{name}.json"] = read_bytes(CERTIFICATES / f"{name}.json", "certificate")
 
 

@@ -62,7 +62,7 @@ def _check_entries(owner: str, entries: list[zipfile.ZipInfo]) -> None:
     """Refuse names that leave the folder or occur twice, links, encrypted files, and sizes of a bomb."""
     if len(entries) > MOST_FILES or sum(entry.file_size for entry in entries) > LARGEST_TOTAL:
         raise InputError(f"{owner} is larger than {MOST_FILES:,} files or {LARGEST_TOTAL:,} bytes when unpacked")
-    seen: set[str] = set()
+    names: set[str] = set()
     for entry in entries:
         name, kind, size = entry.filename, stat.S_IFMT(entry.external_attr >> 16), entry.file_size
         place = PurePosixPath(name)
@@ -70,21 +70,21 @@ def _check_entries(owner: str, entries: list[zipfile.ZipInfo]) -> None:
         for is_wrong, reason in (
             (is_odd, "has a name that is not allowed"),
             (len(place.parts) > MOST_LEVELS, f"is more than {MOST_LEVELS} folders deep"),
-            (".." in place.parts or name.casefold() in seen, "is there twice, or outside of its folder"),
+            (".." in place.parts or name.casefold() in names, "is there twice, or outside of its folder"),
             (kind not in (0, stat.S_IFREG), "is not a plain file, but a folder or a link"),
             (entry.flag_bits & 1, "is encrypted"),
             (size > min(LARGEST_FILE, 2**20 + HIGHEST_RATIO * entry.compress_size), f"is too large: {size:,} bytes"),
         ):
             if is_wrong:
                 raise InputError(f"{owner} contains {name!r}, which {reason}")
-        seen.add(name.casefold())
+        names.add(name.casefold())
 
 
 def _compare(manifest: ArchiveManifest, folder: Path) -> Iterator[str]:
     there = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    for name, known in manifest.files.items():
+    for name, digest in manifest.files.items():
         if name not in there:
             yield f"{name} is missing"
-        elif hashlib.sha256((folder / name).read_bytes()).hexdigest() != known:
+        elif hashlib.sha256((folder / name).read_bytes()).hexdigest() != digest:
             yield f"{name} differs from its SHA-256 in the manifest"
     yield from (f"{name} is not in the manifest" for name in sorted(there - manifest.files.keys() - {MANIFEST}))

@@ -75,9 +75,11 @@ def verify_archive(path: Path, *, share: float | None = None, progress: Progress
     with make_temporary_folder("nlp-gait-verify-") as folder:
         manifest, differences = unpack_archive(path, folder)
         detail = "; ".join(differences) or f"{len(manifest.files)} files have their SHA-256 of the manifest"
-        found = verify_folder(folder, share=share, robots=manifest.robots, progress=progress)
-        codes = _check_code_files(folder, found.records)
-        return found._replace(findings=[Finding("manifest", not differences, detail), *found.findings, *codes])
+        verification = verify_folder(folder, share=share, robots=manifest.robots, progress=progress)
+        codes = _check_code_files(folder, verification.records)
+        return verification._replace(
+            findings=[Finding("manifest", not differences, detail), *verification.findings, *codes]
+        )
 
 
 def verify_folder(
@@ -145,21 +147,21 @@ def _report_evidence(evidence: CheckedRecords) -> Iterator[Finding]:
 
 
 def _list_some(names: Sequence[str]) -> str:
-    more = len(names) - MOST_NAMED
-    return f"{', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''}"
+    unnamed = len(names) - MOST_NAMED
+    return f"{', '.join(names[:MOST_NAMED])}{f' and {unnamed} more' if unnamed > 0 else ''}"
 
 
 def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> str:
     """Compare the code and machines of records with the sessions of the manifest that computed them."""
-    own = [(record, record.origin) for record in records if record.origin is not None]
-    if own and not manifest.sessions:
+    computed = [(record, record.origin) for record in records if record.origin is not None]
+    if computed and not manifest.sessions:
         raise InputError("no session is recorded")
     codes = {session.versions.get("code") for session in manifest.sessions}
     machines = {f"{s.machine.get('processor')}, {s.machine.get('system')}" for s in manifest.sessions}
     started = min((session.started for session in manifest.sessions), default="")
     wrong = [
         f"{name_record(record)} ({why})"
-        for record, origin in own
+        for record, origin in computed
         for holds, why in (
             (record.inputs.code[:8] in codes, "no session ran its code"),
             (origin.machine in machines, "no session ran on its machine"),
@@ -170,9 +172,9 @@ def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> str:
     if wrong:
         raise InputError("; ".join(wrong))
     installed = hash_installed_code()
-    other = any(record.inputs.code != installed for record, _ in own)
-    note = f"; other code is installed here ({installed[:8]})" if other else ""
-    return f"runs computed in a recorded session: {len(own)} of {len(own)}{note}"
+    differs = any(record.inputs.code != installed for record, _ in computed)
+    note = f"; other code is installed here ({installed[:8]})" if differs else ""
+    return f"runs computed in a recorded session: {len(computed)} of {len(computed)}{note}"
 
 
 def _check_plan(folder: Path, manifest: Manifest, records: Sequence[RunRecord]) -> str:
@@ -220,7 +222,7 @@ def _find_deviations(record: RunRecord, task: Task) -> Iterator[str]:
 def _check_certificate(path: Path, number: int) -> str:
     """Compare an archived certificate with the shipped ones; another one is checked as by ``certainty --check``."""
     file = read_certificate(path)
-    if any(file == other for other in load_certificates().values()):
+    if any(file == shipped for shipped in load_certificates().values()):
         how = "equal to the shipped one"
     elif number >= MOST_CERTIFICATES:
         raise NotCheckedError(f"{MOST_CERTIFICATES} are checked in one call; check it by certainty --check")
@@ -231,10 +233,12 @@ def _check_certificate(path: Path, number: int) -> str:
 
 def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Finding]:
     """Compare the archived code of user-defined solvers, which is not run, with the hashes in the records."""
-    parts = [part for r in records if isinstance(part := r.inputs.solver, Mapping) and SOURCE in part]
-    known = {(parse_reference(part["name"], "algorithm").short.partition(":")[0], part[SOURCE]) for part in parts}
+    solvers = [solver for r in records if isinstance(solver := r.inputs.solver, Mapping) and SOURCE in solver]
+    sources = {
+        (parse_reference(solver["name"], "algorithm").short.partition(":")[0], solver[SOURCE]) for solver in solvers
+    }
     findings = []
-    for name, digest in sorted(known):
+    for name, digest in sorted(sources):
         path = folder / "code" / Path(name).name
         same = path.is_file() and hash_file(path) == digest
         detail = "it is the code of the records" if same else "it is missing, or is not the code of the records"
@@ -255,9 +259,9 @@ def _check_texts(folder: Path, records: Sequence[RunRecord], manifest: Manifest,
         if missing:
             raise InputError(f"{_list_some(missing)} should be there")
         for path in written:
-            known, again = read_bytes(folder / path.name, "text"), path.read_bytes()
-            if known != again:
-                pairs = zip_longest(known.decode(errors="replace").split("\n"), again.decode().split("\n"))
+            archived, again = read_bytes(folder / path.name, "text"), path.read_bytes()
+            if archived != again:
+                pairs = zip_longest(archived.decode(errors="replace").split("\n"), again.decode().split("\n"))
                 number, a, b = next((n, a, b) for n, (a, b) in enumerate(pairs, start=1) if a != b)
                 raise InputError(
                     f"line {number} of {path.name} is {a!r:.100}, but the records give {b!r:.100}; if another "
@@ -269,14 +273,14 @@ def _check_texts(folder: Path, records: Sequence[RunRecord], manifest: Manifest,
 def _describe_scope(folder: Path, records: Sequence[RunRecord], repeated: int) -> tuple[str, str]:
     """Return a line about what was evaluated and repeated, and one about what was not checked."""
     listed = {name_run(record) for record in records}
-    others = sum(path.relative_to(folder / RECORDS).with_suffix("").as_posix() not in listed
+    unlisted = sum(path.relative_to(folder / RECORDS).with_suffix("").as_posix() not in listed
                  for path in (folder / RECORDS).glob("*/*.json"))  # fmt: skip
     unrepeated = len(records) - repeated
     parts = [f"the course of {unrepeated} runs that were not repeated"] if unrepeated else []
     parts += ["times and machines: as recorded", "runs that were made, but never listed"]
     if any(isinstance(record.inputs.solver, Mapping) for record in records):
         parts += ["evaluations that user code makes by loading the problem itself"]
-    parts += [f"{others} other records in the folder"] if others else []
+    parts += [f"{unlisted} other records in the folder"] if unlisted else []
     foreign = [p.name for p in sorted(folder.iterdir()) if p.is_file() and p.suffix in (".tex", ".pdf", ".png")]
     parts += [f"{_list_some(foreign)}"] if foreign else []
     points = sum(bool(record.x) for record in records)
@@ -286,19 +290,19 @@ def _describe_scope(folder: Path, records: Sequence[RunRecord], repeated: int) -
 
 def _choose_runs(records: Sequence[RunRecord], share: float | None) -> tuple[list[RunRecord], int]:
     """Return the runs to repeat in random order, and how many of them must be; a forger cannot predict which."""
-    known = [record for record in records if not record.inputs.imported]
-    random.SystemRandom().shuffle(known)
+    computed = [record for record in records if not record.inputs.imported]
+    random.SystemRandom().shuffle(computed)
     if share is not None:
-        count = math.ceil(share * len(known))
-        return known[:count], count
+        count = math.ceil(share * len(computed))
+        return computed[:count], count
     first: dict[object, RunRecord] = {}
-    for problem, runs in group_by(known, lambda record: record.problem).items():
+    for problem, runs in group_by(computed, lambda record: record.problem).items():
         if best := find_best(run for run in runs if run.active_constraints):  # whose prices the report shows
             first[problem] = best
-    for record in known:
+    for record in computed:
         first.setdefault((record.problem, record.solver), record)
     needed = {id(record): record for record in first.values()}
-    return [*{**needed, **{id(record): record for record in known}}.values()], len(needed)
+    return [*{**needed, **{id(record): record for record in computed}}.values()], len(needed)
 
 
 def _repeat_runs(
@@ -327,9 +331,9 @@ def _repeat_runs(
 def _repeat_run(record: RunRecord, moved: RunRecord) -> str:
     """Repeat a run, whose files may have moved: the same seed gives the same bits."""
     again = try_task(_make_task(record, moved.inputs))
-    recorded, found = record.to_json(), again.to_json()
+    recorded, repeated = record.to_json(), again.to_json()
     for what in (name for name in recorded if name not in NOT_REPEATED):
-        before, now = (json.dumps(plain[what], sort_keys=True) for plain in (recorded, found))
+        before, now = (json.dumps(plain[what], sort_keys=True) for plain in (recorded, repeated))
         if before != now:
             text = f"its {what.replace('_', ' ')} differs: recorded {before:.100}, found {now:.100}"
             if record.inputs.code != again.inputs.code:

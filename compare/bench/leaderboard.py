@@ -165,9 +165,9 @@ def _make_instance_row(comparison: Comparison, solver: str | None) -> tuple[str,
     instance = gaitbench.load(comparison.problem)
     costs = {s.name: s.expected_cost(PER_INSTANCE_TARGET) for s in comparison.solvers}
     cheapest = min(costs, key=lambda name: costs[name])
-    known = math.isfinite(costs[cheapest])
+    finite = math.isfinite(costs[cheapest])
     size, best = str(len(instance.names)), f"{comparison.reference:.6g}"
-    row = (comparison.problem, size, best, cheapest if known else "-", format_count(costs[cheapest]))
+    row = (comparison.problem, size, best, cheapest if finite else "-", format_count(costs[cheapest]))
     if solver is None:
         return row
     runs = next(s for s in comparison.solvers if s.name == solver)

@@ -86,7 +86,7 @@ def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEff
     """Run what the baseline lacks on the instances, rank all, and write the leaderboard."""
     instances = choose_instances(chosen.suite, chosen.instances, chosen.families, chosen.seeds)
     shipped = effort.evaluations == EVALUATIONS and set(instances) <= load_table().keys()
-    solvers = {} if shipped else {other: "" for other in parse_names(effort.against) if other != algorithm}
+    solvers = {} if shipped else {name: "" for name in parse_names(effort.against) if name != algorithm}
     if algorithm is not None:
         solvers[algorithm] = label or (f"my-{algorithm}" if algorithm in BASELINE else "")  # the last one
     if effort.tune and not solvers:
@@ -95,7 +95,7 @@ def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEff
         )
     out, records, name = make_writable_folder(effort.out), [], None
     if solvers:
-        specs = [SolverSpec(name=solver, label=own) for solver, own in solvers.items()]
+        specs = [SolverSpec(name=solver, label=given) for solver, given in solvers.items()]
         settings = make_bench_study(instances, *specs, runs=effort.runs, evaluations=effort.evaluations)
         name = settings.tasks()[-1].title if algorithm is not None else None
         if name in BASELINE:

@@ -137,10 +137,10 @@ def _find_inputs(given: Mapping[str, Any], outputs: Container[str]) -> Iterator[
         for text in value if isinstance(value, (list, tuple)) else [value]:
             if name in outputs or not isinstance(text, (str, Path)):
                 continue
-            for part in (str(text), str(text).partition("=")[2], str(text).rpartition(":")[0]):
+            for candidate in (str(text), str(text).partition("=")[2], str(text).rpartition(":")[0]):
                 with suppress(OSError, ValueError):  # a name that is too long, or none
-                    if part and Path(part).is_file():
-                        yield Path(part)
+                    if candidate and Path(candidate).is_file():
+                        yield Path(candidate)
 
 
 def _list_options(function: Callable[..., Any]) -> Iterator[inspect.Parameter]:

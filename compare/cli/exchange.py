@@ -77,13 +77,13 @@ def verify(
         return _pack(study, pack)
     with show_progress("repeated runs", None) as advance:
         check = verify_folder if study.is_dir() else verify_archive
-        found = check(study, share=share, progress=advance)
-    findings = found.findings
+        verification = check(study, share=share, progress=advance)
+    findings = verification.findings
     wrong = [finding for finding in findings if finding.holds is False]
     return Output(
-        data={"holds": not wrong, "findings": [finding._asdict() for finding in findings], "scope": found.scope},
+        data={"holds": not wrong, "findings": [finding._asdict() for finding in findings], "scope": verification.scope},
         parts=[finding.sentence for finding in findings],
-        answer=found.scope,
+        answer=verification.scope,
         failures=[f"{len(wrong)} of {len(findings)} checks do not hold"] if wrong else [],
     )
 

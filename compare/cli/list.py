@@ -60,12 +60,12 @@ def list_problems(
         return _list_all()
     from compare.study.description import describe_solver, list_described_names
 
-    known = list_described_names()
-    if name != ALGORITHMS and name not in known:
+    names = list_described_names()
+    if name != ALGORITHMS and name not in names:
         return _describe_problem(name, {} if robot is None else {"robot": robot})
     if robot is not None:
         raise InputError("--robot takes a problem, or no name")
-    algorithms = [describe_solver(one) for one in (known if name == ALGORITHMS else [name])]
+    algorithms = [describe_solver(one) for one in (names if name == ALGORITHMS else [name])]
     parts = [line for algorithm in algorithms for line in _describe_algorithm(algorithm)]
     return Output(data={"algorithms": [asdict(algorithm) for algorithm in algorithms]}, parts=parts)
 
@@ -118,9 +118,9 @@ def _list_all() -> Output:
         f"for several objectives (pareto): {', '.join(listed['fronts'])}",
         f"robots: {', '.join(listed['robots'])}",
     ]
-    for kind, found in installed.items():
-        if found:
-            packages = ", ".join(f"{name} ({value})" for name, value in found.items())
+    for kind, packages_by_name in installed.items():
+        if packages_by_name:
+            packages = ", ".join(f"{name} ({value})" for name, value in packages_by_name.items())
             parts.append(f"{kind} of other installed packages: {packages}")
     parts.append(
         "your own problem or algorithm can be used by name: FILE.py:NAME or MODULE:NAME; a program: cmd:COMMAND"

@@ -76,17 +76,17 @@ class ProblemOptions:
     def make_spec(self, name: str) -> ProblemSpec:
         """Return the problem of that name with these values; raises UnknownNameError, and InputError for bad values."""
         spec, given = ProblemSpec(name=name), dict(parse_pairs(self.values, "--set"))
-        known = inspect.signature(find_maker(spec.address)).parameters
-        options = parse_options(spec.address, [(key, text) for key, text in given.items() if key in known])
+        maker_options = inspect.signature(find_maker(spec.address)).parameters
+        options = parse_options(spec.address, [(key, text) for key, text in given.items() if key in maker_options])
         if self.robot is not None:
             options["robot"] = self.robot
         if self.limits:
-            if "limits" not in known:
+            if "limits" not in maker_options:
                 raise InputError(f"{name} takes no limits, those of NAO and of humanoids do; leave out --limit")
             options |= parse_options(spec.address, [("limits", ",".join(self.limits))])
         spec = spec.with_options(**options)
         problem = spec.load()
-        numbers = {key: parse_number(key, text, "--set") for key, text in given.items() if key not in known}
+        numbers = {key: parse_number(key, text, "--set") for key, text in given.items() if key not in maker_options}
         fixed = {key: numbers.pop(key) for key in problem.names if key in numbers}
         return replace(spec, values=dict(problem.with_values(**numbers).fix(**fixed).values))
 
@@ -174,11 +174,11 @@ def parse_pairs(items: Sequence[str] | None, flag: str) -> list[tuple[str, str]]
 
 def parse_options(problem: str, pairs: Iterable[tuple[str, str]]) -> dict[str, Any]:
     """Return options of a problem from names and texts; raises UnknownNameError, and InputError for a bad value."""
-    known, options = inspect.signature(find_maker(problem)).parameters, {}
+    parameters, options = inspect.signature(find_maker(problem)).parameters, {}
     for name, text in pairs:
-        if name not in known:
-            raise unknown(f"option of {problem}", name, known)
-        kind = type(known[name].default)
+        if name not in parameters:
+            raise unknown(f"option of {problem}", name, parameters)
+        kind = type(parameters[name].default)
         try:
             options[name] = {"true": True, "false": False}[text.lower()] if kind is bool else kind(text)
         except (KeyError, ValueError):

@@ -107,9 +107,9 @@ def print_output(output: Output, as_json: bool) -> None:
         else:
             print_table(*block)
     if written:
-        others = f" and {len(written) - 1} files" if len(written) > MOST_NAMED else ""
-        for path in written[:1] if others else written:
-            stdout.print(f"wrote {path}{others}", soft_wrap=True)
+        unnamed = f" and {len(written) - 1} files" if len(written) > MOST_NAMED else ""
+        for path in written[:1] if unnamed else written:
+            stdout.print(f"wrote {path}{unnamed}", soft_wrap=True)
     for sentence in output.answer:
         stdout.print(sentence, soft_wrap=True)
 

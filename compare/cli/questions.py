@@ -130,14 +130,14 @@ def _list_variants(problem: GaitProblem, over: str | None, named: Sequence[str] 
     else:
         raise InputError(f"--over takes motors, trajectory or OPTION=VALUE,VALUE,..., got {over!r}")
     for text in named or ():
-        name, _, rest = text.partition(":")
+        name, _, changes = text.partition(":")
         pairs: list[str] = []
-        for piece in rest.split(","):  # a value may contain commas
+        for piece in changes.split(","):  # a value may contain commas
             pairs = [*pairs, piece] if "=" in piece else [*pairs[:-1], f"{pairs[-1]},{piece}" if pairs else piece]
         given = dict(options.parse_pairs(pairs, "--variant NAME:"))
-        other = given.pop(PROBLEM, "")
-        changed = options.parse_options(other or problem.address, given.items())
-        variants.append(Variant(name=name.strip(), options=changed, problem=other))
+        other_problem = given.pop(PROBLEM, "")
+        changed = options.parse_options(other_problem or problem.address, given.items())
+        variants.append(Variant(name=name.strip(), options=changed, problem=other_problem))
     if len(variants) < 2:
         raise InputError(
             "name at least two variants by --over or --variant; the problem itself is one of those of --variant"

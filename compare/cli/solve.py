@@ -80,11 +80,11 @@ def solve(
                 raise
             solution, stopped = interrupt.partial, interrupt.sentence
     proven = guarantee(loaded, loaded.check_x(solution.x)) if solution.feasible else None
-    known = find_reference(identify_problem(loaded))
-    data = {**solution.to_json(), "guaranteed": None if proven is None else asdict(proven), **known.to_json()}
+    reference = find_reference(identify_problem(loaded))
+    data = {**solution.to_json(), "guaranteed": None if proven is None else asdict(proven), **reference.to_json()}
     parts = [*_describe(solution)]
     if proven is not None:
-        parts += [f"Guaranteed: {proven}", describe_value(known, solution.objective, loaded.objective)]
+        parts += [f"Guaranteed: {proven}", describe_value(reference, solution.objective, loaded.objective)]
     written, failures = [], [] if solution.converged else [solution.status]
     if out is not None:
         try:
@@ -217,5 +217,5 @@ def _describe_margins(active: Sequence[str]) -> Iterator[str]:
     if not active:
         yield "No balance margin is active"
         return
-    more = f"; and {len(active) - SHOWN_MARGINS} more" if len(active) > SHOWN_MARGINS else ""
-    yield f"Active margins: {'; '.join(active[:SHOWN_MARGINS])}{more}"
+    hidden = f"; and {len(active) - SHOWN_MARGINS} more" if len(active) > SHOWN_MARGINS else ""
+    yield f"Active margins: {'; '.join(active[:SHOWN_MARGINS])}{hidden}"

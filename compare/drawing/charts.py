@@ -110,12 +110,12 @@ def draw_chart(chart: Chart, width: float, height: float) -> Drawing:
 
 def _draw_series(series: Series, look: Look, x: ChartAxis, y: ChartAxis, solid: bool) -> list[Stroke]:
     points = np.column_stack([x.place(series.x), y.place(series.y)])
-    known = np.isfinite(points).all(axis=1)
-    points = points[known]
+    finite = np.isfinite(points).all(axis=1)
+    points = points[finite]
     if not len(points):
         return []
     if series.upper is not None:
-        upper = np.column_stack([points[:, 0], y.place(series.upper)[known]])
+        upper = np.column_stack([points[:, 0], y.place(series.upper)[finite]])
         return [Stroke(lines=[np.concatenate([points, upper[::-1]])], colour=look.colour, opacity=0.15, filled=True)]
     if series.shape == "points":
         return [Stroke(lines=[MARKERS[look.marker] + point for point in points], colour=look.colour, opacity=0.8)]

@@ -29,10 +29,12 @@ def make_final_gap_charts(comparison: Comparison) -> list[Chart]:
     for place, solver in enumerate(comparison.solvers):
         height = len(comparison.solvers) - place
         gaps = np.array([comparison.gap(cost) for cost in solver.costs])
-        known = np.isfinite(gaps)
-        runs = [record.run for record, is_known in zip(solver.records, known, strict=True) if is_known]
-        notes = [f"{solver.name}, run {run}: {format_percent(gap)}" for run, gap in zip(runs, gaps[known], strict=True)]
-        x, y = clip_percent(gaps[known]), np.full(len(runs), float(height))
+        finite = np.isfinite(gaps)
+        runs = [record.run for record, ended in zip(solver.records, finite, strict=True) if ended]
+        notes = [
+            f"{solver.name}, run {run}: {format_percent(gap)}" for run, gap in zip(runs, gaps[finite], strict=True)
+        ]
+        x, y = clip_percent(gaps[finite]), np.full(len(runs), float(height))
         series.append(Series(name=solver.name, x=x, y=y, shape="points", notes=notes))
         if np.isfinite(middle := comparison.gap(solver.median_cost)):
             bar = clip_percent(np.array([middle, middle]))
@@ -95,11 +97,11 @@ def _trace_gaps(solver: SolverRuns, axis: str) -> list[Series]:
         return []
     grid = np.geomspace(used.min(), used.max(), GRID_POINTS)
     low, middle, high = compute_band(costs, [np.minimum.accumulate(curve.gap) for curve in solver.curves], grid)
-    known, whole = np.isfinite(middle), np.isfinite(high)
+    finite, whole = np.isfinite(middle), np.isfinite(high)
     upper = clip_percent(high[whole])
     return [
         Series(name=solver.name, x=grid[whole], y=clip_percent(low[whole]), upper=upper, shape="band"),
-        Series(name=solver.name, x=grid[known], y=clip_percent(middle[known])),
+        Series(name=solver.name, x=grid[finite], y=clip_percent(middle[finite])),
     ]
 
 

@@ -54,15 +54,15 @@ def assign_looks(names: Collection[str]) -> dict[str, Look]:
     Within ``share_looks`` a solver looks the same in all figures.
     """
     used: Counter[str] = Counter()
-    found: dict[str, Look] = {}
+    looks: dict[str, Look] = {}
     for name in sorted({*names, *_STUDIED.get()}, key=lambda name: (name not in COLOURS, name)):
         # A polished search has its search's colour; an unknown solver gets the least used one.
-        known = COLOURS.get(name) or COLOURS.get(name.split("+")[0])
-        colour = known or min((c for c in COLOURS.values() if c != INK), key=lambda c: used[c])
+        usual = COLOURS.get(name) or COLOURS.get(name.split("+")[0])
+        colour = usual or min((c for c in COLOURS.values() if c != INK), key=lambda c: used[c])
         kind = used[colour]
         used[colour] += 1
-        found[name] = Look(colour=colour, line=LINES[kind % len(LINES)], marker=MARKERS[kind % len(MARKERS)])
-    return {name: found[name] for name in names}
+        looks[name] = Look(colour=colour, line=LINES[kind % len(LINES)], marker=MARKERS[kind % len(MARKERS)])
+    return {name: looks[name] for name in names}
 
 
 _STUDIED: ContextVar[frozenset[str]] = ContextVar("names of all solvers of the study", default=frozenset())

@@ -63,14 +63,14 @@ def draw_gaits(gaits: Mapping[str, GaitCurves], *, curves: bool = True) -> Drawi
         InputError: there is nothing to draw.
     """
     charts = make_gait_charts(gaits) if curves else []
-    (name, first), *others = gaits.items()
+    (name, first), *later = gaits.items()
     if first.skeleton is None and not charts:
         raise InputError("these gaits have neither a skeleton nor torques: there is nothing to draw")
     count = (first.skeleton is not None) + len(charts)
     columns = 2 if count == 4 else count
     panels, over = [], None
-    if others and others[0][1].skeleton is not None:
-        over = (others[0][0], others[0][1].skeleton, assign_looks(list(gaits))[others[0][0]])
+    if later and later[0][1].skeleton is not None:
+        over = (later[0][0], later[0][1].skeleton, assign_looks(list(gaits))[later[0][0]])
     if first.skeleton is not None:
         panels.append(draw_poses(name, first.skeleton, WIDTH / max(columns, 2), HEIGHT, over))
     drawing = place_drawings([*panels, *(draw_chart(chart, WIDTH / columns, HEIGHT) for chart in charts)], columns)
@@ -79,7 +79,7 @@ def draw_gaits(gaits: Mapping[str, GaitCurves], *, curves: bool = True) -> Drawi
 
 def make_gait_charts(gaits: Mapping[str, GaitCurves]) -> list[Chart]:
     """Return the deviation of each gait from the first one, the power and the balance margin over time."""
-    first, *others = gaits.values()
+    first, *later = gaits.values()
     curves: dict[str, dict[str, Array | None]] = {
         "deviation [mm]": {
             name: measure_deviation(gait.skeleton, first.skeleton)

@@ -49,8 +49,8 @@ def draw_poses(
         shapes += _draw_pose(first, k, view, opacity)
     title = name
     if over is not None:
-        other, skeleton, look = over
-        title = f"{name}, and {other} dashed"
+        other_name, skeleton, look = over
+        title = f"{name}, and {other_name} dashed"
         lines = [view.project(limb.points[k]) for k in (0, len(skeleton.t) // 2, -1) for limb in skeleton.limbs]
         shapes.append(Stroke(lines=lines, colour=look.colour, dash="5 3"))
     return Drawing(width=width, height=height, shapes=[*shapes, Label(x=width / 2, y=LINE - 4, text=title)])

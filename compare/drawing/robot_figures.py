@@ -24,7 +24,7 @@ def plot_robot(biped: Biped, path: Path) -> Path:
         canvas = make_figure(9.0, 4.4)
         front, aside, above = canvas.subplots(1, 3)
         for joint in robot.joints.values():
-            end = np.sum([part.origin_m for part in robot.path_to_root(joint.child)], axis=0)
+            end = np.sum([ancestor.origin_m for ancestor in robot.path_to_root(joint.child)], axis=0)
             start = end - np.array(joint.origin_m)
             side = next((s for s in SIDES if joint.name in biped.legs[s].joints), None)
             look = {"color": COLOURS[side] if side else OTHERS, "lw": 2.0 if side else 1.0, "marker": "o", "ms": 2.5}

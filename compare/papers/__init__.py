@@ -30,5 +30,5 @@ def load_reproduction(paper: str) -> Paper[Any, Any]:
         return reproduction
     if paper not in REPRODUCTIONS:
         raise unknown("reproduction", paper, REPRODUCTIONS)
-    found: Paper[Any, Any] = import_module(f"compare.papers.{paper}.{paper}").REPRODUCTION
-    return found
+    registered: Paper[Any, Any] = import_module(f"compare.papers.{paper}.{paper}").REPRODUCTION
+    return registered

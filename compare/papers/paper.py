@@ -124,8 +124,8 @@ def read_book(module: str) -> Book:
     """Return the claims and differences of a paper from its module's file."""
     file = Path(module)
     claims = [ClaimRow(**row) for row in read_rows(file.with_suffix(".csv"))]
-    more = file.with_name("differences.csv")
-    differences = [DifferenceRow(**row) for row in read_rows(more)] if more.exists() else []
+    differing = file.with_name("differences.csv")
+    differences = [DifferenceRow(**row) for row in read_rows(differing)] if differing.exists() else []
     book = Book(file.stem, file.parent, {row.id: row for row in claims}, {row.id: row for row in differences})
     if len({*book.claims, *book.differences}) < len(claims) + len(differences):
         raise ValueError(f"{book.name}: an id has two rows")
@@ -210,20 +210,20 @@ class Paper(Generic[E, R]):
     def _judge(self, id: str, results: Mapping[str, R], reading: str, effort: E) -> Judgement:
         if id in self.book.on_runs and not effort.runs:
             return Judgement(Ruling.NOT_RUN)
-        claim, found = self.book.claims[id], self.book.functions[id](results[reading])
-        if found is not None and not isinstance(found, Found):
-            found = Found(found)
-        return Judgement(decide(claim, found), describe(claim, found))
+        claim, value = self.book.claims[id], self.book.functions[id](results[reading])
+        if value is not None and not isinstance(value, Found):
+            value = Found(value)
+        return Judgement(decide(claim, value), describe(claim, value))
 
     def _make_parts(
         self, results: Mapping[str, R], judged: Mapping[str, Mapping[str, Judgement]], effort: E, runner: Runner
     ) -> list[Part]:
         with use_style():
             shown = self.show(results)
-        own = [id for id in self.book.claims if id not in self.book.on_runs]
+        computed = [id for id in self.book.claims if id not in self.book.on_runs]
         runs = [id for id in self.book.claims if id in self.book.on_runs]
         folded = [
-            *self._fold("claims", "Claims decided by computation", own, judged),
+            *self._fold("claims", "Claims decided by computation", computed, judged),
             *self._fold("claims-on-runs", "Claims decided by runs of the searches", runs, judged),
         ]
         if self.book.differences:

@@ -114,7 +114,7 @@ def _evaluate(name: str | GaitProblem, options: Any, values: Any, x: tuple[float
 
 def evaluate_point(spec: ProblemSpec, x: Sequence[float]) -> Mapping[str, float]:
     """Return objective and performance indexes at x (n,) by the exact functions, which are built once for equal options."""
-    return _evaluate(spec.name, *(tuple(sorted(part.items())) for part in (spec.options, spec.values)), tuple(x))
+    return _evaluate(spec.name, *(tuple(sorted(values.items())) for values in (spec.options, spec.values)), tuple(x))
 
 
 def tabulate(name: str, caption: str, rows: Sequence[Mapping[str, Value]], *, prose: bool = False) -> Table:

@@ -147,9 +147,9 @@ class Certainty(Question[FoundCertainty]):
                 f"none of {self.starts} starts of {problem.name} converged to a feasible point; try more starts"
             )
         best, x = optima[0].objective, optima[0].x
-        known = find_reference(identify_problem(problem))
-        if known.objective is not None and problem.objective.sign * (best - known.objective) > 0.0:
-            x = known.x
+        reference = find_reference(identify_problem(problem))
+        if reference.objective is not None and problem.objective.sign * (best - reference.objective) > 0.0:
+            x = reference.x
         identity = {**fingerprint(problem), "best": list(x)}
         limits = {"tolerance": self.tolerance, "time_limit_s": self.time_limit_s}
 

@@ -172,9 +172,9 @@ def verify_price(optimum: Optimum, near: Outcome, price: Price, change: Callable
     """Return the price with the results of solving again, slightly and a natural step away from the optimum."""
     turn = min(abs(reach) for reach in price.reach)
     small = min(CHECK_SHARE * price.step, max(turn / 2, LEAST_CHECK_SHARE * price.step))
-    low, high, less, more = (_solve_neighbour(near, change(d)) for d in (-small, small, -price.step, price.step))
+    low, high, less, greater = (_solve_neighbour(near, change(d)) for d in (-small, small, -price.step, price.step))
     problem, sign = optimum.problem, optimum.problem.objective.sign
-    steps = tuple(None if end is None else sign * end.cost - optimum.objective for end in (less, more))
+    steps = tuple(None if end is None else sign * end.cost - optimum.objective for end in (less, greater))
     verified = replace(price, one_step=(steps[0], steps[1]))
     if low is None or high is None:
         return verified

@@ -91,9 +91,11 @@ class Question(ABC, Generic[F]):
 
     def add_best_known(self, findings: F) -> "Answer":
         """Return the answer with the shipped best known value of the problem and its distance from the optimum found."""
-        answer, known = self.report(findings), find_reference(identify_problem(self.problem))
-        sentence = describe_value(known, self.get_optimum(findings), self.problem.objective, "the optimum found here")
-        data = {**answer.data, **known.to_json()}
+        answer, reference = self.report(findings), find_reference(identify_problem(self.problem))
+        sentence = describe_value(
+            reference, self.get_optimum(findings), self.problem.objective, "the optimum found here"
+        )
+        data = {**answer.data, **reference.to_json()}
         return replace(answer, headline=(*answer.headline, f"{sentence}."), data=data)
 
     def failures(self, findings: F) -> list[str]:

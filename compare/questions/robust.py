@@ -109,6 +109,6 @@ def _describe_corner(corner: Mapping[str, float]) -> str:
         changed = {name.removesuffix(".mass"): by for name, by in corner.items() if is_mass(name) and sign * by > 0.0}
         if changed:
             names = sorted(changed)
-            others = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-            parts.append(f"{sign * max(map(abs, changed.values())):+.0%} {', '.join(names[:LISTED])}{others}")
+            unlisted = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+            parts.append(f"{sign * max(map(abs, changed.values())):+.0%} {', '.join(names[:LISTED])}{unlisted}")
     return "; ".join(parts)

@@ -177,9 +177,9 @@ class Sweep(Question[list[SweepPoint]]):
         )
 
 
-def _make_point(at: Mapping[str, float], end: Solution) -> SweepPoint:
+def _make_point(values: Mapping[str, float], end: Solution) -> SweepPoint:
     return SweepPoint(
-        at=at,
+        at=values,
         objective=end.best.objective,
         feasible=end.converged,
         status=end.status,
@@ -192,28 +192,30 @@ def _make_point(at: Mapping[str, float], end: Solution) -> SweepPoint:
 
 
 def _describe_known(problem: GaitProblem) -> str:
-    known = find_reference(identify_problem(problem))
-    return "-" if known.objective is None else f"{with_unit(known.objective, problem.objective.unit)} ({known.source})"
+    reference = find_reference(identify_problem(problem))
+    if reference.objective is None:
+        return "-"
+    return f"{with_unit(reference.objective, problem.objective.unit)} ({reference.source})"
 
 
 def plot_sweep(points: Sequence[SweepPoint], problem: GaitProblem) -> Drawing:
     """Plot the optimum over the first axis, with a line for each combination of the others; infeasible points as crosses."""
-    first, *others = points[0].at
+    first, *other_axes = points[0].at
     units, objective = list_units(problem), problem.objective
-    lines = dict.fromkeys(tuple(point.at[name] for name in others) for point in points)
+    lines = dict.fromkeys(tuple(point.at[name] for name in other_axes) for point in points)
     with use_style():
         shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(lines)))
-        figure, axes = make_axes(4.2 if not others else 6.3, 3.0)
+        figure, axes = make_axes(4.2 if not other_axes else 6.3, 3.0)
         for key, shade in zip(lines, shades, strict=True):
-            line = [point for point in points if tuple(point.at[name] for name in others) == key]
+            line = [point for point in points if tuple(point.at[name] for name in other_axes) == key]
             label = ", ".join(
-                format_quantity(name, units[name], value) for name, value in zip(others, key, strict=True)
+                format_quantity(name, units[name], value) for name, value in zip(other_axes, key, strict=True)
             )
             values = [point.objective if point.feasible else np.nan for point in line]
-            colour = shade if others else COLOURS[IPOPT]
+            colour = shade if other_axes else COLOURS[IPOPT]
             axes.plot([point.at[first] for point in line], values, "o-", color=colour, label=label or IPOPT)
         mark_values(axes, sorted({point.at[first] for point in points if not point.feasible}), "infeasible")
         axes.set_xlabel(make_axis_label(first, units[first]))
         axes.set_ylabel("least " * (objective.sign > 0) + make_axis_label(objective.name, objective.unit))
-        figure.legend(loc="outside right upper") if others else axes.legend()
+        figure.legend(loc="outside right upper") if other_axes else axes.legend()
     return figure

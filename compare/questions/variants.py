@@ -250,8 +250,8 @@ def load_variant(problem: GaitProblem, variant: Variant) -> GaitProblem:
     """Return a variant of a problem, with the options and parameter values that both have."""
     options, values = dict(problem.options), dict(problem.values)
     if variant.problem:
-        known = inspect.signature(find_maker(variant.problem)).parameters
-        options = {name: value for name, value in options.items() if name in known}
+        parameters = inspect.signature(find_maker(variant.problem)).parameters
+        options = {name: value for name, value in options.items() if name in parameters}
         values = {}
     return ProblemSpec(
         name=variant.problem or problem.address, options={**options, **variant.options}, values=values

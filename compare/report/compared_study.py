@@ -78,10 +78,10 @@ class ComparedStudy:
         return write_report(Path(folder), self.records, Manifest(settings=None, sessions=()))[0]
 
     def _find(self, problem: str | None) -> Comparison:
-        found = {comparison.problem: comparison for comparison in self.comparisons}
-        if problem is not None and problem not in found:
-            raise unknown("problem of this study", problem, found)
-        return self.comparisons[0] if problem is None else found[problem]
+        by_problem = {comparison.problem: comparison for comparison in self.comparisons}
+        if problem is not None and problem not in by_problem:
+            raise unknown("problem of this study", problem, by_problem)
+        return self.comparisons[0] if problem is None else by_problem[problem]
 
 
 def compare(

@@ -117,7 +117,7 @@ def describe_run_counts(comparison: Comparison) -> str:
     stops = [record.inputs.stop for record in comparison.records]
     budgets = sorted({stop["evaluations"] for stop in stops if "evaluations" in stop})
     count = " to ".join(map(str, dict.fromkeys((runs[0], runs[-1]))))
-    budget = f", at most {join_words(f'{each:,}' for each in budgets)} evaluations of a search" if budgets else ""
+    budget = f", at most {join_words(f'{count:,}' for count in budgets)} evaluations of a search" if budgets else ""
     return f"n = {count} runs of each solver{budget}"
 
 

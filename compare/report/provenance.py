@@ -51,12 +51,12 @@ def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
     """Return the best of the records next to the shipped best known value, a row for each problem that has one."""
     rows = []
     for group in group_by(records, lambda record: hash_json(make_key(record.inputs.problem))).values():
-        known, objective = find_reference(group[0].inputs.problem), group[0].inputs.objective
+        reference, objective = find_reference(group[0].inputs.problem), group[0].inputs.objective
         best = find_best_known(group)
-        if known.objective is not None:
-            gap = format_percent(compute_gap(best, known.objective, objective))
-            values = (with_unit(value, objective.unit) for value in (best, known.objective))
-            rows.append((group[0].problem, *values, gap, known.source))
+        if reference.objective is not None:
+            gap = format_percent(compute_gap(best, reference.objective, objective))
+            values = (with_unit(value, objective.unit) for value in (best, reference.objective))
+            rows.append((group[0].problem, *values, gap, reference.source))
     if not rows:
         return "No best known value is shipped for the settings of these runs; gaps are relative to the best of them."
     header = ("problem", "best of these runs", "best known", "gap", "source of the best known value")

@@ -133,9 +133,9 @@ def write_better_points(folder: Path, comparisons: Sequence[Comparison]) -> list
         gait = load_gait(run)
         evaluation = evaluate(gait.problem, gait.x)
         if evaluation.feasible and comparison.known.is_beaten_by(evaluation.objective["value"], comparison.objective):
-            known = {"objective": comparison.reference, "source": comparison.known.source}
+            best = {"objective": comparison.reference, "source": comparison.known.source}
             origin = {"solver": run.solver, "run": run.run, "seed": run.seed, "settings": run.settings}
             path = folder / f"better-{make_file_name(comparison.problem)}.json"
-            write_json(path, replace_nan({**evaluation.to_json(), "found_by": origin, "best_known_before": known}))
+            write_json(path, replace_nan({**evaluation.to_json(), "found_by": origin, "best_known_before": best}))
             written.append(path)
     return written

@@ -25,21 +25,21 @@ def find_citations(name: str | None = None) -> list[str]:
         UserCodeError: a user-defined problem cannot be loaded.
     """
     text = (files("compare.study") / "citations.toml").read_text(encoding="utf-8")
-    known = tomllib.loads(text.replace("VERSION", version("nlp-gait")))
-    papers, sources = known["papers"], [*known["papers"].values(), known["suite"]]
+    table = tomllib.loads(text.replace("VERSION", version("nlp-gait")))
+    papers, sources = table["papers"], [*table["papers"].values(), table["suite"]]
     if name in papers:
         sources = [papers[name]]
     elif name is not None:
         source = _find_source(name, {*PROBLEMS, *papers, *BY_ID})
         sources = [entry for entry in sources if entry["cited_as"] in source]  # text by which a ``Source:`` names it
-    return [entry["bibtex"].strip() for entry in (known["software"], *sources)]
+    return [entry["bibtex"].strip() for entry in (table["software"], *sources)]
 
 
-def _find_source(name: str, known: set[str]) -> str:
+def _find_source(name: str, ids: set[str]) -> str:
     if name in BY_ID:
         return f"GaitBench: {BY_ID[name].source}"
     if name not in PROBLEMS and not is_user_code(name, "problem"):
-        raise unknown("problem, paper or instance", name, known)
+        raise unknown("problem, paper or instance", name, ids)
     return dict(split_sections(find_maker(name).__doc__ or "")).get("Source", "")
 
 
@@ -47,18 +47,17 @@ def cite_problems(problems: Iterable[Mapping[str, Any]]) -> str:
     """Return BibTeX of the software and the sources of problems as records describe them; user code is not loaded."""
     named = [(problem["name"], problem["options"].get("instance")) for problem in problems]
     names = dict.fromkeys(instance if instance in BY_ID else name for name, instance in named)
-    found = [find_citations(name) for name in names if name in BY_ID or name in PROBLEMS]
-    return "\n\n".join(dict.fromkeys(entry for entries in found or [find_citations()[:1]] for entry in entries))
+    lists = [find_citations(name) for name in names if name in BY_ID or name in PROBLEMS]
+    return "\n\n".join(dict.fromkeys(entry for entries in lists or [find_citations()[:1]] for entry in entries))
 
 
 def split_sections(text: str) -> Iterator[tuple[str, str]]:
     """Yield the sections of a Google docstring with their headings; the first has none."""
     heading, lines = "", list[str]()
     for line in inspect.cleandoc(text).splitlines():
-        found = SECTION.match(line)
-        if found:
+        if title := SECTION.match(line):
             yield heading, "\n".join(lines).strip("\n")
-            heading, lines = found[1], []
+            heading, lines = title[1], []
         else:
             lines.append(line)
     yield heading, "\n".join(lines).strip("\n")

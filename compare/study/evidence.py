@@ -159,11 +159,11 @@ def _make_cases(records: Sequence[RunRecord], find_problem: Callable[[RunRecord]
     codes = Counter((r.inputs.code, r.origin.casadi) for r in records if r.origin is not None)
     installed = [code for code in codes if code[0] == hash_installed_code()]
     usual = max(installed or codes, key=lambda code: codes[code], default=None)
-    seen: dict[object, RunRecord] = {}
+    first_records: dict[object, RunRecord] = {}
     for case in sorted(cases, key=lambda case: case.record.run):
         solver = case.record.problem, case.record.solver, case.record.inputs.solver_key
         marks = (solver[:2], solver, (*solver, case.record.seed))
-        case.first = tuple(seen.setdefault(mark, case.record) for mark in marks)
+        case.first = tuple(first_records.setdefault(mark, case.record) for mark in marks)
         case.code = usual
     return cases
 
@@ -282,8 +282,8 @@ def check_code(case: CheckedRun) -> str | None:
     code = record.inputs.code, record.origin.casadi
     if code == case.code:
         return None
-    found, usual = (f"{digest[:8]}, CasADi {casadi}" for digest, casadi in (code, case.code))
-    return f"it was computed by other code ({found}) than the others ({usual})"
+    code_words, usual = (f"{digest[:8]}, CasADi {casadi}" for digest, casadi in (code, case.code))
+    return f"it was computed by other code ({code_words}) than the others ({usual})"
 
 
 def check_between_samples(case: CheckedRun) -> str | None:

@@ -135,9 +135,9 @@ def _read_histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History,
     table.check_header(HISTORY, ("time_s",))
     columns = [table.column(name) or () for name in HISTORY]
     seconds = table.column("time_s") or (math.nan,) * len(table.rows)
-    found: dict[int, list[tuple[int, float | None, float]]] = {}
+    entries_by_run: dict[int, list[tuple[int, float | None, float]]] = {}
     for k, (run, count, value, time) in enumerate(zip(*columns, seconds, strict=True)):
-        entries = found.setdefault(table.count("run", k, run), [])
+        entries = entries_by_run.setdefault(table.count("run", k, run), [])
         evaluations = table.count("evaluations", k, count, 1)
         if entries and evaluations < entries[-1][0]:
             raise InputError(f"{table.owner}, line {table.lines[k]}: evaluations of run {run:g} must ascend")
@@ -145,13 +145,13 @@ def _read_histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History,
         least = entries[-1][2] if entries and not math.isnan(entries[-1][2]) else 0.0
         table.number("time_s", k, time, least)
         entries.append((evaluations, None if math.isnan(value) else value, time))
-    for run in found:
+    for run in entries_by_run:
         if run not in runs:
             raise InputError(f"{table.owner}: run {run} has no final point")
-    missing = [run for run in runs if run not in found]
+    missing = [run for run in runs if run not in entries_by_run]
     if missing:
         raise InputError(f"{table.owner}: run {missing[0]} has no history")
-    courses = {run: zip(*entries, strict=True) for run, entries in found.items()}
+    courses = {run: zip(*entries, strict=True) for run, entries in entries_by_run.items()}
     return {run: (History(evaluations=counts, objective=f), times) for run, (counts, f, times) in courses.items()}
 
 
@@ -159,12 +159,12 @@ def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> Checked
     """Return the checked imported records in a folder whose problems are those of some records."""
     if not set(read_manifest(folder).runs).difference(name_run(r) for r in records if not r.inputs.imported):
         return CheckedRecords([], [])
-    known = {record.problem: record.inputs.problem for record in records}
+    problems = {record.problem: record.inputs.problem for record in records}
     imported = [
         record
         for record in read_records(folder)
         if record.inputs.imported
-        and record.problem in known
-        and not describe_difference(record.inputs.problem, known[record.problem])
+        and record.problem in problems
+        and not describe_difference(record.inputs.problem, problems[record.problem])
     ]
     return check_records(imported)

@@ -209,14 +209,14 @@ def _load_records(study: Study) -> tuple[dict[int, RunRecord], Counter[tuple[str
         remove_leftovers(make_writable_folder(folder))
     list_runs(study.folder, [name_run(task) for task in study.tasks])
     records = {index: find_record(study.folder, task) for index, task in enumerate(study.tasks)}
-    known = {index: record for index, record in records.items() if record is not None}
-    problems = {id(record): study.tasks[index].problem for index, record in known.items()}
+    finished = {index: record for index, record in records.items() if record is not None}
+    problems = {id(record): study.tasks[index].problem for index, record in finished.items()}
     evidence = check_records(
-        list(known.values()), find_problem=lambda record: problems[id(record)].load(), between_samples="none"
+        list(finished.values()), find_problem=lambda record: problems[id(record)].load(), between_samples="none"
     )
     rejected = Counter((e.record.problem, e.record.solver, e.reasons[0]) for e in evidence.excluded if e.record)
     kept = {id(record) for record in evidence.records}
-    return {index: record for index, record in known.items() if id(record) in kept}, rejected
+    return {index: record for index, record in finished.items() if id(record) in kept}, rejected
 
 
 def _run_missing(study: Study, records: dict[int, RunRecord]) -> Iterator[tuple[int, RunRecord]]:

@@ -151,9 +151,9 @@ class _Counter:
             return RunRecord.make_failed(task, "its process sent a result, but no point to evaluate")
         history, counts = record.history(), (record.evaluations, record.failed, record.generations)
         times = replace(claim.time_s, solve=record.elapsed_s, objective=record.objective_time_s)
-        own = RunRecord.from_task(task, settings=claim.settings, status=claim.status, time_s=times)
+        claimed = RunRecord.from_task(task, settings=claim.settings, status=claim.status, time_s=times)
         listed = {*claim.history.evaluations, record.evaluations}
-        return _judge_search(own, self._problem, record.best_x, record.best, counts, history, listed)
+        return _judge_search(claimed, self._problem, record.best_x, record.best, counts, history, listed)
 
 
 def _search(task: Task) -> RunRecord:

@@ -251,9 +251,9 @@ def list_runs(folder: Path, names: Sequence[str]) -> None:
     with lock_folder(folder):
         file = _read_file(folder)
         solvers = {_name_solver(name) for name in names}
-        others = [name for name in file.runs if _name_solver(name) not in solvers]
-        if set(file.runs) != {*others, *names}:
-            write_json(folder / FILE, asdict(replace(file, runs=(*others, *dict.fromkeys(names)))))
+        kept_names = [name for name in file.runs if _name_solver(name) not in solvers]
+        if set(file.runs) != {*kept_names, *names}:
+            write_json(folder / FILE, asdict(replace(file, runs=(*kept_names, *dict.fromkeys(names)))))
 
 
 def _name_solver(name: str) -> str:
@@ -277,11 +277,11 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def _list_versions() -> dict[str, str]:
-    found = {}
+    versions = {}
     for package in PACKAGES:
         with suppress(PackageNotFoundError):
-            found[package] = version(package)
-    return found
+            versions[package] = version(package)
+    return versions
 
 
 def _describe_kernel() -> str:

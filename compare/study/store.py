@@ -197,9 +197,11 @@ class _StoredSolver(Solver):
         return self._solver.to_dict()
 
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
-        found = self._load_or_run(problem, {"x0": _encode_array(x0)}, stop, lambda ready: ready.run(problem, x0, stop))
-        assert found is not None
-        return found
+        outcome = self._load_or_run(
+            problem, {"x0": _encode_array(x0)}, stop, lambda ready: ready.run(problem, x0, stop)
+        )
+        assert outcome is not None
+        return outcome
 
     def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
         start = {
@@ -249,14 +251,14 @@ def _number(value: float) -> float | str:
 def parse_outcome(raw: Mapping[str, Any]) -> Outcome:
     """Return the outcome of which ``encode_outcome`` made plain data."""
     guess = raw["guess"]
-    found: dict[str, Any] = {name: float(value) if name in FLOATS else value for name, value in raw.items()}
-    found |= {name: _decode_array(raw[name]) for name in ("x0", "x")}
-    found["evaluations"] = Evaluations(**raw["evaluations"])
-    found["history"] = tuple(Best(calls, None if f is None else float(f), float(t)) for calls, f, t in raw["history"])
+    outcome: dict[str, Any] = {name: float(value) if name in FLOATS else value for name, value in raw.items()}
+    outcome |= {name: _decode_array(raw[name]) for name in ("x0", "x")}
+    outcome["evaluations"] = Evaluations(**raw["evaluations"])
+    outcome["history"] = tuple(Best(calls, None if f is None else float(f), float(t)) for calls, f, t in raw["history"])
     if guess is not None:
         multipliers = {name: _decode_array(guess[name]) for name in ("primal", "bounds", "rows")}
-        found["guess"] = Guess(**multipliers, width=float(guess["width"]))
-    return Outcome(**found)
+        outcome["guess"] = Guess(**multipliers, width=float(guess["width"]))
+    return Outcome(**outcome)
 
 
 def _decode_array(numbers: list[float | str]) -> Array:

@@ -220,9 +220,9 @@ class Task:
 
     def inputs(self) -> Inputs:
         """Return everything that the result depends on, as plain data; raises InputError for settings that are not plain."""
-        problem, known = self.problem.load(), () if self.is_search else list_settings(str(self.solver))
+        problem, setting_names = self.problem.load(), () if self.is_search else list_settings(str(self.solver))
         limits = self.stop.limits
-        if not self.is_search and "evaluations" not in known:  # it ends by itself, or by the clock
+        if not self.is_search and "evaluations" not in setting_names:  # it ends by itself, or by the clock
             limits = {key: value for key, value in limits.items() if key == "time_limit_s"}
         try:
             solver, settings = json.loads(json.dumps([self._describe_solver(), dict(self.settings)], allow_nan=False))
@@ -254,17 +254,17 @@ class Task:
         if isinstance(self.solver, str) and is_program(self.solver):
             program = ExternalProgram(command=parse_command(self.solver), name=self.title, settings=self.settings)
             return to_algorithm(program, self.title)
-        own = load_object(str(self.solver), "algorithm") if self.is_user_code else self.solver
-        if isinstance(own, str):
-            return make_algorithm(own, **self.settings)
-        return to_algorithm(own, self.title, self.settings)
+        algorithm = load_object(str(self.solver), "algorithm") if self.is_user_code else self.solver
+        if isinstance(algorithm, str):
+            return make_algorithm(algorithm, **self.settings)
+        return to_algorithm(algorithm, self.title, self.settings)
 
     def make_solver(self) -> Solver:
         """Return the NLP solver with settings and the limits that it respects; InputError for what it does not allow."""
         name, settings = (IPOPT, {}) if self.polish else (str(self.solver), self.settings)
-        known = list_settings(name)
+        setting_names = list_settings(name)
         limits = {"evaluations": self.stop.evaluations, "time_limit_s": self.stop.time_limit_s}
-        respected = {limit: value for limit, value in limits.items() if limit in known and value is not None}
+        respected = {limit: value for limit, value in limits.items() if limit in setting_names and value is not None}
         return make_solver(name, **{**respected, **settings})
 
 
@@ -319,8 +319,8 @@ def describe_settings(settings: Any) -> dict[str, Any]:
     if inspect.isroutine(settings):
         return {"kind": FUNCTION, "function": settings.__qualname__}
     kind = type(settings).__name__
-    known = is_dataclass(settings) and not isinstance(settings, type)
-    values = asdict(settings) if known else {k: v for k, v in getattr(settings, "__dict__", {}).items() if k[0] != "_"}
+    plain = is_dataclass(settings) and not isinstance(settings, type)
+    values = asdict(settings) if plain else {k: v for k, v in getattr(settings, "__dict__", {}).items() if k[0] != "_"}
     return {"kind": kind, **{name: _encode_setting(value) for name, value in values.items()}}
 
 

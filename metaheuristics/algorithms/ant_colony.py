@@ -75,16 +75,16 @@ class _AntColonySearch(PopulationSearch[AntColony]):
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         settings, start = self._settings, self._start
         self._archive = self._archive.join(Points(X, f, violation)).best(settings.archive, rule)
-        known = self._archive.X
-        cumulative = np.cumsum(compute_probabilities(len(known), settings.locality))
+        archived = self._archive.X
+        cumulative = np.cumsum(compute_probabilities(len(archived), settings.locality))
         draws = start.rng.random(settings.population) * cumulative[-1]
-        picked = known[np.searchsorted(cumulative, draws, side="right")]
-        step = compute_deviations(known, picked, settings.spread) * start.rng.standard_normal(picked.shape)
+        picked = archived[np.searchsorted(cumulative, draws, side="right")]
+        step = compute_deviations(archived, picked, settings.spread) * start.rng.standard_normal(picked.shape)
         self._X = np.clip(picked + step, start.lower, start.upper)
 
     def stop(self) -> tuple[str, ...]:
-        known = self._archive.X
-        return ("archive collapsed to one point",) if len(known) and bool((known == known[0]).all()) else ()
+        archived = self._archive.X
+        return ("archive collapsed to one point",) if len(archived) and bool((archived == archived[0]).all()) else ()
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -211,8 +211,8 @@ class _GeneticSearch(PopulationSearch[GeneticAlgorithm]):
             self._parents = self._parents.join(children).best_distinct(settings.population, rule)
         else:
             elites = self._parents.best(settings.elites, rule)
-            rest = children.best(settings.population - len(elites.f), rule)
-            self._parents = elites.join(rest).best(settings.population, rule)
+            survivors = children.best(settings.population - len(elites.f), rule)
+            self._parents = elites.join(survivors).best(settings.population, rule)
         self._X = self._mate()
 
     def _mate(self) -> Array:

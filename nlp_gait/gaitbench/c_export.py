@@ -45,7 +45,7 @@ def make_cpp_source(instance: Instance) -> str:
         "instance_upper": upper,
         "instance_weights": kernel.weights,
     }
-    known = {"lower": instance.lower, "upper": instance.upper, "best_x": instance.best_x}
+    arrays = {"lower": instance.lower, "upper": instance.upper, "best_x": instance.best_x}
     listed = {"variable_names": instance.names, "row_names": sides.names}
     names = {name: f"{{{', '.join(map(json.dumps, texts))}}}" for name, texts in listed.items()}
     return "\n".join(
@@ -62,7 +62,7 @@ def make_cpp_source(instance: Instance) -> str:
             f"static const char instance_upper_side[] = {{{', '.join('1' if s > 0 else '0' for s in sides.sign)}}};",
             *(
                 f'extern "C" const double {prefix}_{name}[] = {_format_numbers(values)};'
-                for name, values in known.items()
+                for name, values in arrays.items()
             ),
             *(f'extern "C" const char* const {prefix}_{name}[] = {values};' for name, values in names.items()),
             f"#define VARIABLES {len(instance.names)}\n#define ROWS {len(lower)}\n#define SIDES {len(instance.row_names)}",

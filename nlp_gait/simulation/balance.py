@@ -139,8 +139,8 @@ class StepClock:
     @property
     def after(self) -> SupportPhase | None:
         """The phase after it."""
-        rest = self._reference.phases[self._number + 1 :]
-        return rest[0] if rest else None
+        later = self._reference.phases[self._number + 1 :]
+        return later[0] if later else None
 
     @property
     def stands(self) -> tuple[bool, bool]:

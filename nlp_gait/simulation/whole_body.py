@@ -99,11 +99,11 @@ class WholeBodyQP:
         hessian, linear = weighted.T @ tasks, -(goals @ weighted)
         hessian[np.diag_indices(len(hessian))] += REGULARISATION
         # Torques of all coordinates: motion @ x + rest; those of the root are zero.
-        motion, rest = np.hstack([inertia[:, free], -contact]), data.qfrc_bias + inertia @ acceleration
+        motion, bias = np.hstack([inertia[:, free], -contact]), data.qfrc_bias + inertia @ acceleration
         joints = self._rates
         rows = np.vstack([motion[:6], motion[joints], np.hstack([np.zeros((len(self._cone), count)), self._cone])])
-        low = np.concatenate([-rest[:6], -self._limits - rest[joints], np.zeros(len(self._cone))])
-        high = np.concatenate([-rest[:6], self._limits - rest[joints], np.full(len(self._cone), UNBOUNDED)])
+        low = np.concatenate([-bias[:6], -self._limits - bias[joints], np.zeros(len(self._cone))])
+        high = np.concatenate([-bias[:6], self._limits - bias[joints], np.full(len(self._cone), UNBOUNDED)])
         least, most, kind = self._bound_wrenches(targets)
         low = np.concatenate([np.full(count, -UNBOUNDED), least, low])
         high = np.concatenate([np.full(count, UNBOUNDED), most, high])
@@ -115,7 +115,7 @@ class WholeBodyQP:
             self.failures += 1
             return None
         acceleration[free] = x[:count]
-        torques = np.clip((motion @ x + rest)[joints], -self._limits, self._limits)
+        torques = np.clip((motion @ x + bias)[joints], -self._limits, self._limits)
         return Torques(torques, acceleration[joints], x[count:])
 
     def _differentiate_soles(self, data: Any) -> tuple[Array, Array]:

@@ -148,9 +148,9 @@ def compute_pace_loss(result: NaoResults, phase: str, end: int) -> float:
     problem, time = make_spec(phase, result.reading).load(), TIMES[phase]
     x = dict(zip(problem.names, PRINTED_X[phase, "PSO"], strict=True))
     margins = []
-    for at in np.geomspace(problem.value(f"{time}.lower"), problem.value(f"{time}.upper"), PACES).tolist():
-        rates = {name: value * x[time] / at for name, value in x.items() if name.startswith("hip_v")}
-        gait = result.measure(phase, **{time: at}, **rates)
+    for duration in np.geomspace(problem.value(f"{time}.lower"), problem.value(f"{time}.upper"), PACES).tolist():
+        rates = {name: value * x[time] / duration for name, value in x.items() if name.startswith("hip_v")}
+        gait = result.measure(phase, **{time: duration}, **rates)
         margins.append(min(gait[index] for index in MARGINS[:2]))
     return 100 * (1 - margins[end] / max(margins))
 

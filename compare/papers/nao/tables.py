@@ -51,7 +51,7 @@ def compute_powers(
     signals, problem = result.sample("ssp", search, **changes), make_spec("ssp", result.reading).load()
     t, tau, qd = (signals.arrays[name] for name in ("t", "tau", "qd"))
     parts = np.abs(tau * qd), problem.value("heat_loss_W_per_Nm2") * tau**2
-    mechanical, heat = (np.trapezoid(part, t, axis=0) / (t[-1] - t[0]) for part in parts)
+    mechanical, heat = (np.trapezoid(power, t, axis=0) / (t[-1] - t[0]) for power in parts)
     return dict(zip(signals.joints, mechanical, strict=True)), dict(zip(signals.joints, heat, strict=True))
 
 
@@ -136,7 +136,7 @@ def tabulate_causes(result: NaoResults) -> Table:
     """Return what each supposed cause of the missing power of single support gives, next to the print."""
     swings = {float(row["swing_height_m"]): float(row["PSO_W"]) for row in read_rows(FOLDER / "swing_heights.csv")}
     gaits = {"PSO": ("PSO", 0.015), "GA": ("GA", 0.015), "0.018": ("PSO", 0.018), "0.022": ("PSO", 0.022)}
-    drawn = {name: compute_powers(result, search, swing_height_m=at) for name, (search, at) in gaits.items()}
+    drawn = {name: compute_powers(result, search, swing_height_m=height) for name, (search, height) in gaits.items()}
     printed = {"PSO": swings[0.015], "GA": PRINTED["ssp", "GA"]["power_W"]}
     printed |= {name: swings[float(name)] for name in ("0.018", "0.022")}
     rows = list[Mapping[str, Value]]()
@@ -144,9 +144,9 @@ def tabulate_causes(result: NaoResults) -> Table:
         powers = printed
         if cause["cause"] != "printed":
             powers = {name: _weigh(cause, *parts) for name, parts in drawn.items()}
-        more = {name: 1000 * (power - powers["PSO"]) for name, power in powers.items() if name != "PSO"}
+        excess = {name: 1000 * (power - powers["PSO"]) for name, power in powers.items() if name != "PSO"}
         titles = {"GA": "GA more than PSO [mW]", "0.018": "swing height 18 mm [mW]", "0.022": "swing height 22 mm [mW]"}
-        rows.append({"cause": cause["cause"], "PSO [W]": powers["PSO"], **{titles[n]: v for n, v in more.items()}})
+        rows.append({"cause": cause["cause"], "PSO [W]": powers["PSO"], **{titles[n]: v for n, v in excess.items()}})
     return tabulate("causes", "", rows)
 
 

@@ -167,7 +167,7 @@ def train_network(
     for rate, unit in rates:
         settings = NetworkSettings(rate=rate)
         train = make_training_path(settings, unit * lengths[0], unit * lengths[1], poses)
-        reached, errors, steps = (np.array(part) for part in train(settings.first_weights, unit * legs))
+        reached, errors, steps = (np.array(values) for values in train(settings.first_weights, unit * legs))
         off = np.abs((reached.T - angles + np.pi) % (2 * np.pi) - np.pi)
         converged = errors[0] <= settings.tolerance_m2
         numbers: dict[str, float | None] = {

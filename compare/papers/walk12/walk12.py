@@ -138,7 +138,8 @@ def compute_unreachable_share(result: Results) -> float:
 
 def list_rod_changes(result: Results) -> list[float]:
     """Return the change of f1 of the printed gaits by links as uniform rods [%]."""
-    robot, (phases, weights) = load_point_mass_biped(), (np.array(part).ravel() for part in make_rule("gauss", 20))
+    robot = load_point_mass_biped()
+    phases, weights = (np.array(numbers).ravel() for numbers in make_rule("gauss", 20))
     m = np.array(walk12_model.list_masses(robot)).ravel()
     x, phase = SX.sym("x", len(NAMES)), SX.sym("phase")
     legs = walk12_model.compute_legs(x, phase, SX(1), SX(0), SX(0), robot, Exact())

@@ -140,8 +140,8 @@ class Pareto(Question[FoundFront]):
 
     def find(self, work: Work) -> Iterator[FoundFront]:
         criterion, problem = self.criterion, self.criterion.drop_demand(self.problem)
-        known = list(find_reference(identify_problem(self.problem)).x)
-        effort: dict[str, Any] = {"points": self.points, "starts": self.starts, "seed": self.seed, "known": known}
+        best = list(find_reference(identify_problem(self.problem)).x)
+        effort: dict[str, Any] = {"points": self.points, "starts": self.starts, "seed": self.seed, "known": best}
         inputs = {**fingerprint(problem), "criterion": criterion.name, **effort}
         solver, progress, code = work.solver(), work.progress, [front_module]
         solve = partial(solve_front, problem, criterion, **effort, solver=solver, progress=progress)

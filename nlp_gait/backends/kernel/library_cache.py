@@ -44,8 +44,8 @@ def load_library(
     machine = (platform.system(), platform.machine(), *platform.libc_ver())
     inputs = (source, *compiler.command, compiler.version, *flags, *machine)
     key = hashlib.sha256("\0".join(inputs).encode()).hexdigest()[:32]
-    if found := _find_library(key, symbols):
-        return found
+    if library := _find_library(key, symbols):
+        return library
     with lock_folder(find_cache_folder(), f"{key}.lock"):  # another process may be building it
         return _find_library(key, symbols) or _build_library(key, source, compiler, flags, symbols, write_source)
 
