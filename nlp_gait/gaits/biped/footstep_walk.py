@@ -79,7 +79,9 @@ class FootstepWalk(WholeWalk):
         phase = self.phases[section.kind]
         if section.kind is not Support.DOUBLE:
             return phase
-        return replace_margins(phase, make_stance_margins(self.body, section.feet[1]))
+        stance = make_stance_margins(self.body, section.feet[1])
+        limits = (stance if isinstance(limit, BalanceMargins) else limit for limit in phase.limits)
+        return replace(phase, limits=tuple(limits))
 
     def place_right_foot(self, section: MotionSection, point: NumericPoint) -> tuple[list[Any], Foothold]:
         """Return the last variables of a section's phase, ``RIGHT``, and where the right foot is at its end."""
@@ -123,12 +125,6 @@ def list_states(steps: int) -> tuple[State, ...]:
 def name_speed(end: str, step: int) -> str:
     """Return the name of the parameter that limits the speed of a step; ``end`` is least or greatest."""
     return f"step{step}_{end}_speed_m_s"
-
-
-def replace_margins(phase: Phase, margins: BalanceMargins) -> Phase:
-    """Return a phase with other balance margins."""
-    limits = (margins if isinstance(limit, BalanceMargins) else limit for limit in phase.limits)
-    return replace(phase, limits=tuple(limits))
 
 
 def make_stance_margins(body: Body, right: Foothold) -> BalanceMargins:
@@ -199,10 +195,12 @@ def plan_footstep_walk(body: Body, footholds: tuple[Foothold, ...], steps: int, 
     feet, (*first, last) = list_feet(footholds, body.feet_y), make_phase_variables(body)
     given = (replace(last, name=name, unit=name.rpartition("_")[2], description="of the right foot") for name in RIGHT)
     planners = [make_footstep_planner(body, turning, swings) for swings in (False, True)]
-    phases = make_walk_phases(body, (*first[:-1], *given), planners, grid, loads)
     least = compute_sole_margins(body.robot.feet["left"], (LEAST_SHARE, LEAST_SHARE))
-    phases[Support.SINGLE] = replace_margins(phases[Support.SINGLE], limit_to_sole(body, (0.0, body.feet_y[0]), least))
-    phases[Support.DOUBLE] = replace_margins(phases[Support.DOUBLE], make_stance_margins(body, feet[0]))
+    margins = {
+        Support.SINGLE: limit_to_sole(body, (0.0, body.feet_y[0]), least),
+        Support.DOUBLE: make_stance_margins(body, feet[0]),
+    }
+    phases = make_walk_phases(body, (*first[:-1], *given), planners, margins, grid, loads)
     variables = make_footstep_variables(body, steps)
     both_ways = tuple(
         replace(v, lower=min(v.lower, -v.upper)) if v.name.startswith(("hip_x", "hip_vx")) else v for v in variables

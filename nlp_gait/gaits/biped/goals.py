@@ -33,7 +33,6 @@ class Goal:
     objective: Objective = POWER  # name and unit
     power: PowerModel = compute_paper_power  # of the motors; if it is not the paper's, the paper's is an index too
     figure: Callable[[Samples], MX] | None = None  # of the samples; None for power
-    heat: Parameter = HEAT_LOSS  # parameter K with the robot's default
 
     def evaluate(self, point: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX]]:
         """Return the objective and the indexes: power, and what is minimised instead, or the power of the paper's motors."""

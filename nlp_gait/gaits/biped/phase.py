@@ -107,7 +107,7 @@ class Phase:
         """Of the goal and of all limits; pairs of bounds are last because there are many."""
         unique: dict[str, Parameter] = {}
         of_limits = (parameter for limit in self.every_limit for parameter in limit.parameters)
-        for parameter in (self.goal.heat, *of_limits):
+        for parameter in (self.body.heat, *of_limits):
             unique.setdefault(parameter.name, parameter)
         return tuple(sorted(unique.values(), key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
 
@@ -126,7 +126,7 @@ class Phase:
         """Evaluate the phase at N + 1 equidistant samples, or with analytic derivatives at other phases (1, k); one map."""
         return self.sample_several([point], ops, phases)[0]
 
-    def sample_several(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None = None) -> list[Samples]:
+    def sample_several(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None = None) -> list[Samples]:
         """Evaluate the phase at several points in one map, each as ``sample`` does; several need analytic derivatives."""
         return [
             Samples(
@@ -138,18 +138,18 @@ class Phase:
                 progress=self.grid.progress if phases is None else phases,
                 values=values,
             )
-            for point, values in zip(ats, self._evaluate(ats, ops, phases), strict=True)
+            for point, values in zip(points, self._evaluate(points, ops, phases), strict=True)
         ]
 
-    def _evaluate(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[dict[str, MX]]:
+    def _evaluate(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[dict[str, MX]]:
         """Return the quantities that limits and the goal read, by name, at each point."""
         if self.derivatives != "analytic":
             stages = self._make_stages(self._symbolic_plan(ops), self._names_read)
-            return [self._evaluate_stages(stages, point) for point in ats]
-        columns = self._map_instant(ats, ops, phases)
-        split = [[values] if len(ats) == 1 else ca.horzsplit(values, values.shape[1] // len(ats)) for values in columns]
+            return [self._evaluate_stages(stages, point) for point in points]
+        columns = self._map_instant(points, ops, phases)
+        split = [ca.horzsplit(values, values.shape[1] // len(points)) for values in columns]
         return [
-            {name: values[k] for name, values in zip(self._names_read, split, strict=True)} for k in range(len(ats))
+            {name: values[k] for name, values in zip(self._names_read, split, strict=True)} for k in range(len(points))
         ]
 
     def measure(self, name: str, now: Instant) -> SX:
@@ -252,20 +252,20 @@ class Phase:
         inputs, outputs = self._instant_outputs(Exact())
         return ca.Function("sample", inputs, simplify(outputs))
 
-    def _map_instant(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[Any]:
+    def _map_instant(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[Any]:
         """Evaluate one instant at all samples, or at other phases; its open equations become rows of gradient solvers."""
         if ops.exact:  # the judge, the proofs and the start points share it
-            return self._map(self._exact_instant, ats, phases=phases)
+            return self._map(self._exact_instant, points, phases=phases)
         inputs, outputs = self._instant_outputs(ops)
         roots = ops.open_roots()
         if roots is None:
-            return self._map(ca.Function("sample", inputs, simplify(outputs)), ats, phases=phases)
-        (start,) = self._map(ca.Function("start", inputs, simplify([roots.start])), ats, phases=phases)
+            return self._map(ca.Function("sample", inputs, simplify(outputs)), points, phases=phases)
+        (start,) = self._map(ca.Function("start", inputs, simplify([roots.start])), points, phases=phases)
         tied = ca.Function("sample", [roots.unknowns, *inputs], simplify([roots.residual, *outputs]))
         columns: list[Any] = []
 
         def residual(unknowns: MX) -> MX:
-            rows, *quantities = self._map(tied, ats, unknowns, phases=phases)
+            rows, *quantities = self._map(tied, points, unknowns, phases=phases)
             columns.extend(quantities)
             return rows
 
@@ -316,7 +316,7 @@ class Phase:
     def _history_stages(self) -> "Stages":
         return self._make_stages(self._exact_plan, IN_TIME)
 
-    def _map(self, function: ca.Function, ats: Sequence[Point], *columns: MX, phases: MX | None = None) -> list[Any]:
+    def _map(self, function: ca.Function, points: Sequence[Point], *columns: MX, phases: MX | None = None) -> list[Any]:
         """Evaluate a function of columns and (x, margin, phase) at all samples, or at other phases (1, k), of each point.
 
         Columns are those of its inputs that differ from sample to sample.
@@ -325,16 +325,16 @@ class Phase:
         last: Any = phases
         if phases is None:
             function, last = tabulate_last_input(function, DM(np.linspace(0.0, 1.0, n)).T)
-        points = [
+        blocks = [
             [
                 ca.repmat(point.select(self.names).x, 1, n),
                 ca.repmat(point[REACH_MARGIN], 1, n),
                 last,
             ]
-            for point in ats
+            for point in points
         ]
-        inputs = points[0] if len(ats) == 1 else [ca.horzcat(*blocks) for blocks in zip(*points, strict=True)]
-        return list(function.map(n * len(ats)).call([*columns, *inputs]))
+        inputs = [ca.horzcat(*rows) for rows in zip(*blocks, strict=True)]
+        return list(function.map(n * len(points)).call([*columns, *inputs]))
 
     def _differences(self, q: MX, point: Point) -> tuple[MX, MX]:
         """Differentiate sampled angles (m, N + 1) twice: central differences, one-sided at the ends.

@@ -29,19 +29,19 @@ DRAWS = 50  # of a start point, at most
 
 
 def make_goal(body: Body, criterion: Criterion) -> Goal:
-    """Return the goal of a criterion, with the robot's motors and heat constant.
+    """Return the goal of a criterion, with the robot's motors.
 
     Raises InputError if the motors change the power, but something else is minimised.
     """
-    motors, heat = body.motors, body.heat
+    motors = body.motors
     if criterion != "power" and motors.power is not None:
         raise InputError(
             f"motors={','.join(motors.features)!r} changes the power, but the objective is "
             f"{INSTEAD[criterion].objective.name}; leave out what changes it"
         )
     if criterion != "power":
-        return replace(INSTEAD[criterion], heat=heat)
-    return Goal(heat=heat) if motors.power is None else Goal(heat=heat, power=motors.power)
+        return INSTEAD[criterion]
+    return Goal() if motors.power is None else Goal(power=motors.power)
 
 
 def make_phase_limits(body: Body, balance: limits.BalanceMargins) -> tuple[limits.Limit, ...]:
@@ -63,10 +63,11 @@ def make_phase(
     balance: limits.BalanceMargins,
     loads: Loader | None,
     added_limits: tuple[limits.Limit, ...] = (),
+    make: Callable[..., Phase] = Phase,
     **fields: Any,
 ) -> Phase:
     """Return a phase of a kind with the usual limits, others, and further fields; ``loads`` are those of double support."""
-    return Phase(
+    return make(
         body=body,
         loads=make_single_support_loads(body) if loads is None or kind is Support.SINGLE else loads,
         limits=(*make_phase_limits(body, balance), *added_limits, *body.motors.limits),

@@ -34,7 +34,7 @@ from nlp_gait.gaits.biped.cycle import make_cycle_margins
 from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.footholds import Foothold
-from nlp_gait.gaits.biped.limits import RowsAndIndexes
+from nlp_gait.gaits.biped.limits import BalanceMargins, RowsAndIndexes
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_goal, make_phase
@@ -183,12 +183,17 @@ def make_speed_row(name: str, speed: MX, least: MX, greatest: MX) -> Constraint:
 
 
 def make_walk_phases(
-    body: Body, variables: tuple[Variable, ...], planners: list[Planner], grid: Grid, loads: Loader
+    body: Body,
+    variables: tuple[Variable, ...],
+    planners: list[Planner],
+    margins: Mapping[Support, BalanceMargins],
+    grid: Grid,
+    loads: Loader,
 ) -> dict[Support, Phase]:
     """Return the phases by kind; planners are those of a right foot that stands, with loads, and of one that swings."""
-    margins, goal = make_cycle_margins(body), make_goal(body, "power")
+    goal = make_goal(body, "power")
     box = make_support_box(body.robot, {"L": (0.0, body.feet_y[0]), "R": (0.0, body.feet_y[1])})
-    balance = margins | {Support.STAND: limit_to_box(box)}
+    balance = {**margins, Support.STAND: limit_to_box(box)}
     fields: dict[str, Any] = {"variables": variables, "duration": DURATION, "grid": grid, "goal": goal}
     return {
         kind: make_phase(body, kind, limit, loads, plan=planners[kind is Support.SINGLE], **fields)
@@ -218,7 +223,8 @@ def plan_whole_walk(body: Body, steps: int, grid: Grid, flight: Flight | None = 
 
     steps = check_count("steps", steps, at_least=HALF_STEPS, at_most=MOST_STEPS)
     planners = [make_planner(body, partial(read, swings=swings)) for swings in (False, True)]
-    phases = make_walk_phases(body, make_phase_variables(body), planners, grid, make_divided_loads(body, "lever"))
+    margins, loads = make_cycle_margins(body), make_divided_loads(body, "lever")
+    phases = make_walk_phases(body, make_phase_variables(body), planners, margins, grid, loads)
     variables = make_walk_variables(body, steps)
     walk = WholeWalk(
         body=body, steps=steps, variables=variables, phases=phases, sections=list_sections(steps), flight=flight

@@ -33,7 +33,6 @@ from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, PLANNED_JOINTS, YAW_PITCH
 from nlp_gait.gaits.nao.leaning_torso import make_leaning_nao
 from nlp_gait.gaits.nao.problems import STEP_M, NaoOptions, PaperLoads, nao_ssp
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.tape import tabulate_last_input
 from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic, fit_spline
 
 YAW_PITCH = "HipYawPitch"  # curve of both hips
@@ -55,15 +54,11 @@ class FreePhase(JointPhase):
         return MOVING
 
     def move(self, point: Point, ops: Nonsmooth, phases: MX | None = None) -> MX:
-        n = self.grid.parts + 1 if phases is None else int(phases.shape[1])
         x, margin, s = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("s")
         joints = self.list_motions(InstantPoint.of(x, margin, self.names, [limits.REACH_MARGIN]), s, ops)
         moved = ca.vertcat(*(joints[name][order] for order in range(3) for name in MOVING[1:]))
-        motion = ca.Function("motion", [x, margin, s], [ca.cse(moved)])
-        motion, table = (
-            tabulate_last_input(motion, DM(np.linspace(0.0, 1.0, n)).T) if phases is None else (motion, phases)
-        )
-        return motion.map(n)(ca.repmat(point.x, 1, n), ca.repmat(point[limits.REACH_MARGIN], 1, n), table)
+        (motions,) = self._map(ca.Function("motion", [x, margin, s], [ca.cse(moved)]), [point], phases=phases)
+        return motions
 
     def list_motions(self, point: InstantPoint, phase: SX, ops: Nonsmooth) -> dict[str, Motion]:
         """Return the motions of the joints that move [rad]."""

@@ -63,8 +63,8 @@ class JointPhase(Phase):
             }
         )
 
-    def _evaluate(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[dict[str, Any]]:
-        return [self._evaluate_names(self._names_read, point, ops, phases) for point in ats]
+    def _evaluate(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[dict[str, Any]]:
+        return [self._evaluate_names(self._names_read, point, ops, phases) for point in points]
 
     def _evaluate_histories(self, point: NumericPoint) -> dict[str, Any]:
         return self._evaluate_names(IN_TIME, point, Exact())

@@ -18,10 +18,10 @@ from nlp_gait.gaits.biped.body import LIFT, TIMES, Support
 from nlp_gait.gaits.biped.bounds import make_hip_variables, make_lift_variable, make_time_variable
 from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins
 from nlp_gait.gaits.biped.cycle_motion import STEP, make_cycle_variables
-from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import BalanceMargins, Limit, RowsAndIndexes, make_rows
-from nlp_gait.gaits.biped.loads import Division, make_divided_loads, make_single_support_loads
-from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase_limits, make_phase_problem
+from nlp_gait.gaits.biped.loads import Division, make_divided_loads
+from nlp_gait.gaits.biped.phase import Phase
+from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase, make_phase_problem
 from nlp_gait.gaits.biped.samples import CORNERS, LEAST_DURATION, Samples
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
 from nlp_gait.gaits.biped.switch import SWITCHES
@@ -182,21 +182,21 @@ def make_recorded_phase(
     variables: tuple[Variable, ...],
     grid: Grid,
     rule: Division,
-    limits: tuple[BalanceMargins, *tuple[Limit, ...]],
-) -> RecordedPhase:
+    balance: BalanceMargins,
+    *limits: Limit,
+) -> Phase:
     """Return a phase that a motion shows, with the limits of planned ones, balance and others."""
     body = motion.body
-    balance, *limits_besides = limits
-    freed = replace(body, upright=frozenset())
-    return RecordedPhase(
-        body=body,
+    return make_phase(
+        body,
+        kind,
+        balance,
+        make_divided_loads(body, rule),
+        limits,
+        RecordedPhase,
         variables=variables,
         duration=TIMES[kind],
-        loads=make_single_support_loads(freed) if kind is Support.SINGLE else make_divided_loads(freed, rule),
         grid=grid,
-        limits=(*make_phase_limits(body, balance), *limits_besides),
-        goal=Goal(heat=body.heat),
-        standing=kind.standing,
         support=body.support,
         curves={name: (name,) for name in body.joints},
         held={},
@@ -218,7 +218,7 @@ def make_recorded_phase_problem(kind: Support, motion: RecordedMotion, grid: Gri
         x, y = (places[:, :2].mean(axis=0) + (0.0, left[1])).tolist()
         balance, foot = limit_to_box(make_support_box(body.robot, {"L": left, "R": (x, y)})), StandingLimits()
     variables = (make_time_variable(body, kind),)
-    phase = make_recorded_phase(motion, kind, variables, grid, "printed", (balance, hip, foot))
+    phase = make_recorded_phase(motion, kind, variables, grid, "printed", balance, hip, foot)
     return make_phase_problem(kind, f"{'single' if kind is Support.SINGLE else 'double'} support", phase)
 
 
@@ -234,7 +234,7 @@ def make_recorded_cycle_problem(motions: Mapping[Support, RecordedMotion], repea
     single = (margins[Support.SINGLE], hip, SwingLimits(motions[Support.SINGLE], planned[LIFT]))
     double = (margins[Support.DOUBLE], StandingLimits())
     phases = {
-        kind: make_recorded_phase(motions[kind], kind, variables, grid, "lever", limits)
+        kind: make_recorded_phase(motions[kind], kind, variables, grid, "lever", *limits)
         for kind, limits in ((Support.SINGLE, single), (Support.DOUBLE, double))
     }
     cycle = WalkingCycle(body=body, variables=variables, phases=phases, at_given_speed=False)
@@ -258,7 +258,9 @@ def make_recorded_gait(
         raise InputError(f"a motion is judged by the limits of {', '.join(GAITS)}, got {gait!r}")
     options: Mapping[str, str | int] = {"robot": robot, "intervals": intervals}
     nao = make_nao(robot)
-    motion = read_motion(angles, replace(nao, family="recorded", title=f"A recorded gait of {nao.title}"))
+    # Torso and soles of a recorded motion may turn.
+    body = replace(nao, family="recorded", title=f"A recorded gait of {nao.title}", upright=frozenset())
+    motion = read_motion(angles, body)
     if touch_down_s is None and gait in ("nao-ssp", "nao-dsp"):
         phases = {Support.SINGLE if gait == "nao-ssp" else Support.DOUBLE: (0.0, motion.duration_s)}
     else:
