@@ -177,18 +177,18 @@ def make_change(best: Array, change: str, seed: int) -> AffineMap:
             place = np.where(near, (best + rng.random(n)) / WIDTH, place)
     lower = best - place * WIDTH
     matrix, offset, upper = np.eye(n), np.zeros(n), lower + WIDTH
-    other = np.random.default_rng([seed, 2])
+    generator = np.random.default_rng([seed, 2])
     if change == "mirrored":
         matrix, offset = -np.eye(n), lower + upper
     elif change == "scaled":
-        factors = 10.0 ** other.uniform(-3.0, 3.0, n)
+        factors = 10.0 ** generator.uniform(-3.0, 3.0, n)
         matrix, lower, upper = np.diag(1.0 / factors), lower * factors, upper * factors
     elif change == "rotated":
-        order = other.permutation(n)
+        order = generator.permutation(n)
         matrix = rotate_pairs(order.tolist(), [ANGLE] * (n // 2))
         offset = best - matrix @ best
     elif change == "permuted":
-        order = other.permutation(n)
+        order = generator.permutation(n)
         matrix, lower, upper = np.eye(n)[:, order], lower[order], upper[order]
     return AffineMap(matrix=matrix, offset=offset, lower=lower, upper=upper)
 

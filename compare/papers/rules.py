@@ -85,12 +85,12 @@ class ClaimRow:
         return all(value[0] in "+-" for value in self.printed.split(" / "))
 
 
-def decide(claim: ClaimRow, found: Found | None) -> Ruling:
+def decide(claim: ClaimRow, result: Found | None) -> Ruling:
     """Return the verdict on a claim; None if there is no feasible result."""
-    if found is None:
+    if result is None:
         return Ruling.NOT_SHOWN
     kind, amount, unit = claim.parts
-    ours, size = np.asarray(found.values, dtype=float), amount or 0.0
+    ours, size = np.asarray(result.values, dtype=float), amount or 0.0
     if not np.isfinite(ours).all():
         return Ruling.NOT_SHOWN
     if kind == "within":
@@ -102,9 +102,9 @@ def decide(claim: ClaimRow, found: Found | None) -> Ruling:
         change = rows[:, -1] - rows[:, 0]
         return _say(steady and bool(np.all((change > 0) & (change >= least * (1 - ROUNDING)))))
     if kind == "p <":
-        if found.p is None:
+        if result.p is None:
             raise ValueError(f"{claim.id}: its rule needs a p-value")
-        return _say(bool(np.all(ours > 0))) if np.median(found.p) < size else Ruling.NOT_SHOWN
+        return _say(bool(np.all(ours > 0))) if np.median(result.p) < size else Ruling.NOT_SHOWN
     if kind == "same order":
         return _say(np.array_equal(np.argsort(ours, kind="stable"), np.argsort(claim.values, kind="stable")))
     if kind == "rank":
@@ -134,11 +134,11 @@ def _say(holds: bool) -> Ruling:
     return Ruling.HOLDS if holds else Ruling.FAILS
 
 
-def describe(claim: ClaimRow, found: Found | None) -> str:
+def describe(claim: ClaimRow, result: Found | None) -> str:
     """Return our numbers as a cell shows them; long series by their ends, runs by the rank of the printed value."""
-    if found is None:
+    if result is None:
         return "no feasible result"
-    values = np.asarray(found.values, dtype=float)
+    values = np.asarray(result.values, dtype=float)
     if claim.parts[0] == "rank":
         rows = np.atleast_2d(values)
         ranks = " / ".join(str((row < printed).sum()) for row, printed in zip(rows, claim.values, strict=True))
@@ -146,9 +146,9 @@ def describe(claim: ClaimRow, found: Found | None) -> str:
         return f"{ends}{_space(claim.unit)}; {ranks} of {rows.shape[1]} runs below"
     signed = claim.parts[0] == "within" and claim.signed
     text = "; ".join(_join(row, signed) for row in np.atleast_2d(values)) + _space(claim.unit)
-    if found.p is None:
+    if result.p is None:
         return text
-    tests = np.atleast_1d(found.p)
+    tests = np.atleast_1d(result.p)
     spread = f" ({tests.min():.2g} to {tests.max():.2g} in {tests.size} tests)" if tests.size > 1 else ""
     return f"{text}, p = {np.median(tests):.2g}{spread}"
 

@@ -262,9 +262,9 @@ def check_history(case: CheckedRun) -> str | None:
 
 def check_settings(case: CheckedRun) -> str | None:
     """Find a run whose settings are not those of the other runs of its name, or whose seed is that of another one."""
-    record, (other, first, twin) = case.record, case.first
-    if other.inputs.solver_key != record.inputs.solver_key:
-        return f"its inputs are not those of run {other.run} of the same name; give the solvers different labels"
+    record, (namesake, first, twin) = case.record, case.first
+    if namesake.inputs.solver_key != record.inputs.solver_key:
+        return f"its inputs are not those of run {namesake.run} of the same name; give the solvers different labels"
     if record.inputs.is_search and record.x and first.x and record.settings != first.settings:
         return f"its settings are not those of run {first.run}"
     if twin is not record:

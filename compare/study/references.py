@@ -77,10 +77,10 @@ def find_reference(problem: Mapping[str, Any]) -> Reference:
             return generated
         names = ("name", "options", "parameters")
         same = [why for entry, why in differences if all(entry.problem[n] == problem.get(n) for n in names)]
-        known = any(entry.problem["name"] == problem.get("name") for entry in load_shipped())
+        listed = any(entry.problem["name"] == problem.get("name") for entry in load_shipped())
         if same:
             return Reference(source=f"{OWN}; the shipped value is not used, for the problem has changed: {same[0]}")
-        return Reference(source=f"{OWN}; none is shipped for {'these settings' if known else 'this problem'}")
+        return Reference(source=f"{OWN}; none is shipped for {'these settings' if listed else 'this problem'}")
     objective, bound = shipped.objective, shipped.bound
     evidence = f"best of {shipped.found_by}" if bound is None else f"proven to {describe_gap(bound, objective)}"
     source = f"shipped, {evidence}"
