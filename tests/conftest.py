@@ -33,6 +33,12 @@ PROGRAMS = ("Rscript", "julia", "mkoctfile", "octave-cli", "pdflatex")
 # Folders of tests that start whole commands, studies and papers; other slow tests are marked where they stand.
 SLOW_FOLDERS = tuple(f"tests/compare/{name}/" for name in ("cli", "papers", "questions"))
 
+# Here it does not matter in how many processes a study runs, and each would import and build everything again.
+IN_ONE_PROCESS = (
+    *(f"tests/compare/{name}/" for name in ("analysis", "archive", "bench", "cli", "papers", "questions", "report")),
+    *("tests/examples/", "tests/faults/test_attacks.py"),
+)
+
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
@@ -87,10 +93,10 @@ def coarse_pictures() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="module")
-def one_core() -> Iterator[None]:
-    """Compute in this process alone: each fork would build again what this process has built already."""
-    if not hasattr(os, "sched_setaffinity"):
+@pytest.fixture(scope="module", autouse=True)
+def one_core(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Let the tests of some files see one processor, a different one in each of pytest-xdist's processes."""
+    if not (hasattr(os, "sched_setaffinity") and request.node.nodeid.startswith(IN_ONE_PROCESS)):
         yield
         return
     usual = os.sched_getaffinity(0)

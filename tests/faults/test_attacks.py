@@ -35,13 +35,13 @@ SETTINGS = StudySettings(
 
 
 @pytest.fixture(autouse=True)
-def no_further_runs(one_core: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def no_further_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Repeat one run of each solver, as on a slow machine: a forgery must not depend on time for further ones."""
     monkeypatch.setattr("compare.archive.verify.FURTHER_S", 0.0)
 
 
 @pytest.fixture(scope="module")
-def honest(one_core: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def honest(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("honest")
     settings.write_manifest(folder, SETTINGS, settings.Session.begin("nlp-gait compare walk12", "1"))
     run_study(Study(tasks=SETTINGS.tasks(), folder=folder))

@@ -16,7 +16,7 @@ import pytest
 import nlp_gait
 from nlp_gait.errors import OutputError
 from nlp_gait.formulation import Result
-from tests.compare.cli.calls import as_json
+from tests.compare.cli.calls import as_json, process
 from tests.compare.cli.calls import nlp_gait as call
 
 pytest.importorskip("mujoco")
@@ -146,10 +146,8 @@ def display() -> Iterator[str]:
 
 @pytest.mark.slow
 def test_the_window_opens_on_a_display(stored: Path, display: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from tests.compare.cli.calls import process
-
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setenv("DISPLAY", display)
     watched = process("simulate", stored, "--live", "--json")
     assert watched.returncode == 0, watched.stderr
-    assert watched.stdout == process("simulate", stored, "--json").stdout
+    assert watched.stdout == call("simulate", stored, "--json").stdout

@@ -23,7 +23,7 @@ FEWER = {"nao": {"starts": 0}}
 
 
 @pytest.fixture(scope="module")
-def quick(tmp_path_factory: pytest.TempPathFactory) -> Quick:
+def quick(tmp_path_factory: pytest.TempPathFactory, coarse_pages: None) -> Quick:
     """Return folder and record of a paper's quick reproduction, which is run once."""
 
     @cache
