@@ -88,16 +88,8 @@ class WalkingCycle(Sequence):
         touch_down, landing = self.touch_down.join(self.phases, extended, single, double, ops)
         rows = [*lift_off, *touch_down]
         if self.at_given_speed:
-            rows.append(
-                make_rows(
-                    "step_length",
-                    "m",
-                    extended[STEP],
-                    extended[f"{STEP}.lower"],
-                    extended[f"{STEP}.upper"],
-                    over="once",
-                )
-            )
+            lower, upper = (extended[f"{STEP}.{end}"] for end in ("lower", "upper"))
+            rows.append(make_rows("step_length", "m", extended[STEP], lower, upper, over="once"))
         return Assembly(
             objective=mean if self.at_given_speed else energy / step,
             constraints=(*sections.rows, *rows),

@@ -43,10 +43,12 @@ class CycleOptions(SampleOptions, LoadOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class WalkOptions(SampleOptions):
-    """A walk from standing to standing.
+    """A walk from standing to standing: weight shift, half step, steps, half step, weight shift.
+
+    All inner steps are one cycle, whose speed may have limits, which are parameters.
 
     Attributes:
-        steps: swings of a foot, both half steps included
+        steps: swings of a foot; the first and the last one are half steps, so that the feet advance by one step length less
         slope_deg: by which the ground rises forward; all places are in its axes, in which gravity is tilted
         footholds: rows ``x,y,z,yaw`` [m, degrees], separated by semicolons: where the right foot, the left foot and so on land
             instead; every step then has its own states

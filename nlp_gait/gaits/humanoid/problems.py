@@ -71,10 +71,7 @@ def humanoid_cycle(robot: HumanoidOptions, options: CycleOptions) -> GaitProblem
 
 @maker
 def humanoid_walk(robot: HumanoidOptions, options: WalkOptions, stairs: Stairs) -> GaitProblem:
-    """Whole walk from standing to standing: weight shift, half step, steps, half step, weight shift.
-
-    All inner steps are one cycle, as in ``humanoid-cycle``; its speed may have limits, which are parameters. The feet advance by
-    one step length less than there are steps, because the first and the last one are half steps.
+    """Whole walk from standing to standing, see ``WalkOptions``.
 
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
