@@ -9,7 +9,7 @@ import pytest
 import nlp_gait
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.export.formats import write_as
-from nlp_gait.formulation import Result, list_problems
+from nlp_gait.formulation import Result
 from nlp_gait.formulation.result import sample_at_period
 
 DSP = (0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, 2)
@@ -34,29 +34,6 @@ def test_csv_has_plain_headers_with_units_and_rows_exactly_a_period_apart(result
     signals = result.problem.signals(result.x)
     knee = signals.joints.index("LKneePitch")
     np.testing.assert_allclose(table[::2, header.index("tau_LKneePitch_Nm")], signals.arrays["tau"][:, knee], rtol=1e-9)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", list_problems())
-def test_every_time_history_of_every_problem_has_its_unit(name):
-    problem = nlp_gait.load(name)
-    signals = problem.signals(problem.start_point(np.random.default_rng(0)))
-    table = list(signals.named_columns())
-    values = sum(array.size for array in signals.arrays.values())
-    assert len({column for column, _, _ in table}) == len(table) == values // len(signals.arrays["t"])
-    units = {column: unit for column, unit, _ in table}
-    expected = {
-        "hip z": "m",
-        "power knee": "W",
-        "link_q UH": "rad",
-        "stance_force z": "N",
-        "reach swing knee": "1",
-        "zmp x": "m",
-    }
-    for column, unit in expected.items():
-        assert units.get(column, unit) == unit
-    if name == "stairs-plan":
-        assert expected.keys() <= units.keys()
 
 
 def test_ros_trajectory_is_exactly_periodic_and_agrees_with_the_csv(result, tmp_path):

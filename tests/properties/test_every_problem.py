@@ -205,6 +205,35 @@ def test_every_row_and_index_has_its_own_name(name: str) -> None:
     assert (model.row_scales > 0.0).all()
 
 
+UNITS = {
+    "hip z": "m",
+    "power knee": "W",
+    "link_q UH": "rad",
+    "stance_force z": "N",
+    "reach swing knee": "1",
+    "zmp x": "m",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_every_time_history_has_its_unit_and_is_drawn(name: str) -> None:
+    problem = problem_of(name)
+    signals = problem.signals(problem.start_point(np.random.default_rng(0)))
+    table = list(signals.named_columns())
+    units = {column: unit for column, unit, _ in table}
+    assert len(units) == len(table) == sum(a.size for a in signals.arrays.values()) // len(signals.arrays["t"])
+    assert all(units.get(column, unit) == unit for column, unit in UNITS.items())
+    assert name != "stairs-plan" or UNITS.keys() <= units.keys()
+    if problem.display.skeleton is None:
+        assert name == "stairs-climb"
+        return
+    skeleton = problem.display.skeleton(signals, problem.parameter_values)
+    low, high = skeleton.box()
+    assert np.isfinite(low).all() and (high - low).max() > 0.1
+    assert all(len(limb.points) == len(skeleton.t) for limb in skeleton.limbs)
+
+
 RICHER = [("nao-ssp", {"trajectory": "spline-2"}), ("nao-dsp", {"trajectory": "quintic"})]
 # Central differences on a hundredth of the grid's steps, relative to the largest rate; at switches of phases rates may jump.
 RATE_TOLERANCE, SMOOTH_SHARE = 1e-4, 0.95

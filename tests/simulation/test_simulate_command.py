@@ -5,13 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import nlp_gait
-from compare.cli import app
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.gaits.stairs.track import PLAN
+from tests.compare.cli.calls import as_json, one_sentence
 
 mujoco = pytest.importorskip("mujoco")
 pytestmark = pytest.mark.slow  # each gait is simulated
@@ -117,9 +116,6 @@ def test_the_command_simulates_them_and_names_what_is_not_repeated(tmp_path: Pat
     problem = nlp_gait.load("stairs-track")
     result = tmp_path / "climb.json"
     result.write_text(json.dumps({"problem": problem.name, "x": problem.by_name(problem.check_x(TRACKED))}))
-    done = CliRunner().invoke(app, ["simulate", str(result), "--out", str(tmp_path / "out"), "--json"])
-    assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout)["fallen"] is False
+    assert as_json("simulate", result, "--out", tmp_path / "out")["fallen"] is False
     assert 'name="tread 1"' in (tmp_path / "out" / "model.xml").read_text()
-    refused = CliRunner().invoke(app, ["simulate", str(result), "--steps", "2"])
-    assert refused.exit_code != 0 and "not a cycle that can be repeated" in refused.output + refused.stderr
+    assert "not a cycle that can be repeated" in one_sentence("simulate", result, "--steps", "2")

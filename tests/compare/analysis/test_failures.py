@@ -9,15 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from compare.cli import app
 from metaheuristics import ParticleSwarm
 from nlp_gait.backends.kernel.compiler import find_compiler
 from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE
+from tests.compare.cli.calls import nlp_gait
 from tests.faults.processes import ROOT
 
-RUN = CliRunner()
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 STUDY = "compare walk12 --algorithms pso,ga --runs 2 --starts 0 --evaluations 100 --jobs 1".split()
 
@@ -49,20 +47,17 @@ def test_a_solver_without_any_run_ends_a_comparison_with_status_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     failing(monkeypatch, 1)
-    with_a_run_left = RUN.invoke(app, [*STUDY, "--out", str(tmp_path / "left")])
-    assert with_a_run_left.exit_code == 0, with_a_run_left.output
+    with_a_run_left = nlp_gait(*STUDY, "--out", tmp_path / "left")
     assert with_a_run_left.stderr.startswith("nlp-gait: walk12, pso: 1 of 2 runs have no result; ")
     assert with_a_run_left.stderr.count("\n") == 1
     monkeypatch.undo()
     failing(monkeypatch, 2)
-    done = RUN.invoke(app, [*STUDY, "--out", str(tmp_path)])
-    assert done.exit_code == 1, done.output
-    first, last = done.stderr.splitlines()
+    first, last = nlp_gait(*STUDY, "--out", tmp_path, status=1).stderr.splitlines()
     assert first == "nlp-gait: walk12, pso: 2 of 2 runs have no result; the first failed: RuntimeError: no home"
     assert last.startswith("nlp-gait: without any result: pso; fix the cause")
     assert "RuntimeError: no home" in (tmp_path / "report.md").read_text()
-    again = RUN.invoke(app, ["compare", "--resume", "--out", str(tmp_path), "--json"])
-    assert again.exit_code == 1 and json.loads(again.stdout)["problems"]["walk12"]
+    again = nlp_gait("compare", "--resume", "--out", tmp_path, "--json", status=1)
+    assert json.loads(again.stdout)["problems"]["walk12"]
 
 
 @pytest.mark.slow

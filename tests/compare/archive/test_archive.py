@@ -6,12 +6,10 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from compare.archive import Finding, pack_study, unpack_archive, verify_folder
 from compare.archive.pack import _collect_robot, write_archive
 from compare.archive.verify import _check_code_files
-from compare.cli import app
 from compare.study.evidence import read_evidence
 from compare.study.record_files import read_records
 from compare.study.run_study import Study, run_study
@@ -21,6 +19,7 @@ from nlp_gait.errors import InputError, UserCodeError
 from nlp_gait.proofs.certificate import load_certificates
 from nlp_gait.user_code import allow_code
 from tests.compare.archive.forged_archives import Files, damage, forge, sign, write_zip
+from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 from tests.robots.crooked import crooked, crooked_urdf
 from tests.robots.test_mjcf import plain_urdf
 
@@ -140,19 +139,15 @@ def test_included_files_and_meshes_travel_with_an_mjcf(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_commands_and_a_forged_report(folder: Path, tmp_path: Path, coarse_pictures: None) -> None:
-    call = CliRunner().invoke
-    packed = call(app, ["verify", str(folder), "--pack", str(tmp_path / "study.zip")])
-    assert packed.exit_code == 0, packed.output
-    good = call(app, ["verify", str(tmp_path / "study.zip"), "--rerun", "5%", "--json"])
-    assert good.exit_code == 0 and json.loads(good.stdout)["holds"], good.output
+    nlp_gait("verify", folder, "--pack", tmp_path / "study.zip")
+    assert as_json("verify", tmp_path / "study.zip", "--rerun", "5%")["holds"]
     with zipfile.ZipFile(tmp_path / "study.zip") as archive:
         content = {name: archive.read(name) for name in archive.namelist()}
     content["report.md"] = content["report.md"].replace(b"On walk the best f is 0.9", b"On walk the best f is 1.9", 1)
     (tmp_path / "forged.zip").write_bytes(write_zip(sign(content)))
-    bad = call(app, ["verify", str(tmp_path / "forged.zip")])
-    assert bad.exit_code == 1 and "texts: DOES NOT HOLD: line" in bad.stdout, bad.output
-    refused = call(app, ["verify", str(tmp_path / "forged.zip"), "--rerun", "most"])
-    assert refused.exit_code == 1 and "--rerun: the share must be a finite number" in refused.stderr
+    assert "texts: DOES NOT HOLD: line" in nlp_gait("verify", tmp_path / "forged.zip", status=1).stdout
+    refused = one_sentence("verify", tmp_path / "forged.zip", "--rerun", "most")
+    assert "--rerun: the share must be a finite number" in refused
 
 
 @pytest.mark.slow

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.formulation import Result, list_problems, sample_signals
+from nlp_gait.formulation import Result, sample_signals
 
 SSP = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)
 WALK = (0.13, 0.1135, 0.02, 0.0204)
@@ -43,15 +43,6 @@ def test_walk12_legs_reach_from_hip_to_ankle():
     lengths = np.linalg.norm(np.diff(np.stack([limb.points for limb in walk.limbs]), axis=2), axis=3)
     np.testing.assert_allclose(lengths[..., 1:], np.broadcast_to(lengths[0, 0, 1:], lengths[..., 1:].shape), atol=1e-9)
     assert walk.soles[0].supports[0] and not walk.soles[0].supports[-1]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in list_problems() if name != "stairs-climb"])
-def test_every_problem_can_be_drawn(name):
-    skeleton = drawn(name)
-    low, high = skeleton.box()
-    assert np.isfinite(low).all() and (high - low).max() > 0.1
-    assert all(len(limb.points) == len(skeleton.t) for limb in skeleton.limbs)
 
 
 def test_the_drawn_stair_climber_is_where_its_planner_puts_it():

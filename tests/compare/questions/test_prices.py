@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from compare.questions.prices import AGREEMENT, Prices
 from compare.questions.question import Work, find
@@ -12,8 +11,6 @@ from nlp_gait import load, make_solver
 from nlp_gait.errors import InputError
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
-
-RUN = CliRunner()
 
 
 @pytest.fixture(scope="module")

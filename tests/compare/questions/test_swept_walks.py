@@ -1,14 +1,11 @@
 """Sweeps of walking cycles: cost of transport, results that can be simulated, and the engine."""
 
 import csv
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from compare.cli import app
 from compare.questions.question import Work, find
 from compare.questions.sweep import Sweep, parse_axis
 from compare.questions.swept_walks import SweepPoint
@@ -17,6 +14,7 @@ from compare.study.store import Store
 from nlp_gait import load
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load_result
+from tests.compare.cli.calls import as_json
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
@@ -76,9 +74,7 @@ def test_only_walking_cycles_are_simulated() -> None:
 
 def test_the_command_simulates_stored_gaits(points: list[SweepPoint], folder: Path) -> None:
     pytest.importorskip("mujoco")
-    done = CliRunner().invoke(app, [*COMMAND, "--engine", "--steps", "2", "--out", str(folder), "--json"])
-    assert done.exit_code == 0, done.output
-    found = json.loads(done.stdout)["points"]
+    found = as_json(*COMMAND, "--engine", "--steps", "2", "--out", folder)["points"]
     assert [point["x"] for point in found] == [point.x for point in points[:2]]
     for point in found:
         assert point["walk"]["steps_done"] == 2 and not point["walk"]["measurements"]["fallen"]

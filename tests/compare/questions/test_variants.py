@@ -1,13 +1,9 @@
 """Variants of a problem: what is solved, from where, and what the command writes of it."""
 
-import json
 from pathlib import Path
-from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from compare.cli import app
 from compare.questions.question import find
 from compare.questions.variants import (
     SolvedVariant,
@@ -20,16 +16,9 @@ from compare.questions.variants import (
 from nlp_gait import load
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem
+from tests.compare.cli.calls import as_json
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
-
-RUN = CliRunner()
-
-
-def run(*arguments: str) -> Any:
-    done = RUN.invoke(app, ["variants", *arguments, "--json"])
-    assert done.exit_code == 0, done.output
-    return json.loads(done.stdout)
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +75,7 @@ def test_free_joints_of_single_support_do_not_contain_a_plan() -> None:
 
 def test_the_command_reports_what_each_feature_of_the_motors_changes(tmp_path: Path) -> None:
     named = ["--variant", "limits:motors=limits", "--variant", "K:motors=limits,ankle,heat"]
-    answer = run("nao-dsp", *named, "--starts", "1", "--out", str(tmp_path))
+    answer = as_json("variants", "nao-dsp", *named, "--starts", "1", "--out", tmp_path)
     published, limited, heated = answer["variants"]
     assert [v["options"] for v in answer["variants"]] == [{}, {"motors": "limits"}, {"motors": "limits,ankle,heat"}]
     assert published["objective"] == pytest.approx(0.531886, abs=1e-6)
