@@ -63,7 +63,7 @@ def newton_euler(
     q: Mapping[str, SX],
     qd: Mapping[str, SX],
     qdd: Mapping[str, SX],
-    gravity: float | tuple[float, float, float],
+    gravity: tuple[float, float, float],
     shares: Mapping[str, SX] | None = None,
     upright: Collection[str] = (),
 ) -> tuple[dict[str, SX], Wrench]:
@@ -74,7 +74,7 @@ def newton_euler(
         q: joint angles by name [rad]; a constant angle costs no operations.
         qd: joint velocities by name [rad/s].
         qdd: joint accelerations by name [rad/s^2].
-        gravity: magnitude, acting along -z, or the vector (3,) [m/s^2].
+        gravity: (3,) along x, y and z [m/s^2], see ``tilt_gravity``.
         shares: factors on mass and inertia of links by name, for a link that two trees carry together.
         upright: links that do not turn, which saves operations.
 
@@ -91,12 +91,11 @@ def newton_euler(
     rotations = [relative_rotation(body, q) for body in tree]
     moved: list[tuple[SX, SX, SX, SX]] = []  # spin, its rate, turning and acceleration of each body
     wrenches: list[Wrench] = []  # that the motion of each body needs, about its reference point, in its axes
-    down = gravity if isinstance(gravity, tuple) else (0.0, 0.0, -gravity)
     for body, inertia, rotation in zip(tree, regroup_inertias(tree, shares), rotations, strict=True):
         spin, spin_rate = SX(3, 1), SX(3, 1)
         if body.joint is None:
             # gravity as an upward acceleration of the ground
-            acceleration = SX(DM([0.0 - component for component in down]))
+            acceleration = SX(DM([0.0 - component for component in gravity]))
         else:
             parent_spin, parent_spin_rate, parent_turning, parent_acceleration = moved[body.parent]
             acceleration = rotation.T @ (parent_acceleration + parent_turning @ DM(body.offset_m))

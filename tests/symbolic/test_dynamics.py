@@ -9,7 +9,7 @@ from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import make_tree, weld
 from nlp_gait.symbolic.dynamics import newton_euler, regroup_inertias
 
-GRAVITY = 9.8
+GRAVITY = (0.0, 0.0, -9.8)
 ROBOT = weld(load_robot("nao-v5"), ("HeadYaw", "HeadPitch"))
 FOOT = ROBOT.feet["left"]
 TREE = make_tree(ROBOT, FOOT.link)

@@ -102,5 +102,5 @@ def make_impulses(body: Body) -> ca.Function:
     q, jump = (SX.sym(name, len(body.joints)) for name in ("q", "jump"))
     tree = make_tree(body.robot, body.robot.feet["left"].link, body.joints)
     angles, accelerations = (dict(zip(body.joints, ca.vertsplit(vector), strict=True)) for vector in (q, jump))
-    torques, wrench = newton_euler(tree, angles, dict.fromkeys(body.joints, SX(0)), accelerations, 0.0)
+    torques, wrench = newton_euler(tree, angles, dict.fromkeys(body.joints, SX(0)), accelerations, (0.0, 0.0, 0.0))
     return ca.Function("impulses", [q, jump], [ca.vertcat(*(torques[name] for name in body.joints)), wrench.force])
