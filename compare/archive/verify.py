@@ -6,7 +6,6 @@ What can be computed is computed again and compared: every point, random runs, r
 import json
 import math
 import random
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -37,8 +36,6 @@ from nlp_gait.user_code import hash_file, is_user_code, parse_reference, resolve
 
 # Fields in which a repeated run may differ from its record.
 NOT_REPEATED = ("problem", "solver", "run", "inputs", "time_s", "origin")
-# By default one run of each solver and problem is repeated, and further ones for so long [s].
-FURTHER_S = 2.0
 MOST_CERTIFICATES = 20  # whose proofs are followed in one call
 PAGES = ("report.html", "report.md")
 MOST_NAMED = 5  # runs or files in a sentence
@@ -93,8 +90,8 @@ def verify_folder(
 
     Args:
         folder: of the study.
-        share: of the runs that are repeated, drawn at random, from 0 to 1; None for one run of each solver and problem, the run
-            whose prices are shown, and further runs for two seconds.
+        share: of the runs that are repeated, drawn at random, from 0 to 1; None for one run of each solver and problem, and the
+            run whose prices are shown.
         robots: files that stand for the options of problems that name files, relative to the folder.
         progress: receives a line for each repeated run.
     """
@@ -288,21 +285,19 @@ def _describe_scope(folder: Path, records: Sequence[RunRecord], repeated: int) -
     return done, f"not checked: {'; '.join(parts)}"
 
 
-def _choose_runs(records: Sequence[RunRecord], share: float | None) -> tuple[list[RunRecord], int]:
-    """Return the runs to repeat in random order, and how many of them must be; a forger cannot predict which."""
+def _choose_runs(records: Sequence[RunRecord], share: float | None) -> list[RunRecord]:
+    """Return the runs to repeat; a forger cannot predict which."""
     computed = [record for record in records if not record.inputs.imported]
     random.SystemRandom().shuffle(computed)
     if share is not None:
-        count = math.ceil(share * len(computed))
-        return computed[:count], count
+        return computed[: math.ceil(share * len(computed))]
     first: dict[object, RunRecord] = {}
     for problem, runs in group_by(computed, lambda record: record.problem).items():
         if best := find_best(run for run in runs if run.active_constraints):  # whose prices the report shows
             first[problem] = best
     for record in computed:
         first.setdefault((record.problem, record.solver), record)
-    needed = {id(record): record for record in first.values()}
-    return [*{**needed, **{id(record): record for record in computed}}.values()], len(needed)
+    return list({id(record): record for record in first.values()}.values())
 
 
 def _repeat_runs(
@@ -313,19 +308,16 @@ def _repeat_runs(
     check_texts: Callable[[], Finding],
 ) -> list[Finding]:
     """Return the finding about the texts, which are written next to the runs, and one for each repeated run."""
-    chosen, needed = _choose_runs(records, share)
+    chosen = _choose_runs(records, share)
 
     def repeat(record: RunRecord) -> Finding:
         progress(name_record(record))
         return _judge(f"repeated: {name_record(record)}", lambda: _repeat_run(record, _move_files(record, places)))
 
-    began = time.monotonic()
-    for record in chosen[:needed]:  # built before the forks
+    for record in chosen:  # built before the forks
         load_problem(_move_files(record, places))
     calls: list[Callable[[], Finding]] = [check_texts, *(partial(repeat, record) for record in chosen)]
-    first = compute_in_forks(call, calls[: needed + 1])
-    further = compute_in_forks(call, calls[needed + 1 :], lambda: time.monotonic() - began > FURTHER_S)
-    return [*first, *further]
+    return list(compute_in_forks(call, calls))
 
 
 def _repeat_run(record: RunRecord, moved: RunRecord) -> str:

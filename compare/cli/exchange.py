@@ -21,7 +21,7 @@ FINALS = "One row per run: the variables, and where known run, seed, objective, 
 HISTORY = "Best so far: run, evaluations, objective and optionally time_s."
 EVALUATIONS = "Evaluations of every run, if neither file has them; leave it out if they are unknown."
 PACK = "Check the records of the folder, and pack the study for others."
-RERUN = "Runs to repeat, drawn at random, 0% to 100% (default: one of each solver and problem, more for 2 s)."
+RERUN = "Runs to repeat, drawn at random, 0% to 100% (default: one of each solver and problem)."
 
 
 @command

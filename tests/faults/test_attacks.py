@@ -34,12 +34,6 @@ SETTINGS = StudySettings(
 )
 
 
-@pytest.fixture(autouse=True)
-def no_further_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Repeat one run of each solver, as on a slow machine: a forgery must not depend on time for further ones."""
-    monkeypatch.setattr("compare.archive.verify.FURTHER_S", 0.0)
-
-
 @pytest.fixture(scope="module")
 def honest(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("honest")
