@@ -65,7 +65,7 @@ def falls(run: Run, impulse_Ns: tuple[float, float], settle_s: float) -> bool:
 def bisect(
     runs: list[Run], direction: str, unit_Ns: float, settle_s: float, falls_needed: int = 1, levels: int = LEVELS
 ) -> tuple[float, float]:
-    """Return two neighbouring impulses [N s], of ``levels`` up to the largest: so many of the runs fall at the second only."""
+    """Return neighbouring impulses [N s] of ``levels`` up to the largest: so many runs fall at the second, fewer at the first."""
     (x, y), low, high = DIRECTIONS[direction], 0, levels
     level_Ns = LARGEST * unit_Ns / levels
     while high - low > 1:

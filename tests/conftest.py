@@ -33,12 +33,6 @@ PROGRAMS = ("Rscript", "julia", "mkoctfile", "octave-cli", "pdflatex")
 # Folders of tests that start whole commands, studies and papers; other slow tests are marked where they stand.
 SLOW_FOLDERS = tuple(f"tests/compare/{name}/" for name in ("cli", "papers", "questions"))
 
-# Here it does not matter in how many processes a study runs, and each would import and build everything again.
-IN_ONE_PROCESS = (
-    *(f"tests/compare/{name}/" for name in ("analysis", "archive", "bench", "cli", "papers", "questions", "report")),
-    *("tests/examples/", "tests/faults/test_attacks.py"),
-)
-
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
@@ -91,19 +85,6 @@ def coarse_pictures() -> Iterator[None]:
     """Do so for a test."""
     with _draw_coarsely():
         yield
-
-
-@pytest.fixture(scope="module", autouse=True)
-def one_core(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Let the tests of some files see one processor, a different one in each of pytest-xdist's processes."""
-    if not (hasattr(os, "sched_setaffinity") and request.node.nodeid.startswith(IN_ONE_PROCESS)):
-        yield
-        return
-    usual = os.sched_getaffinity(0)
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    os.sched_setaffinity(0, {sorted(usual)[worker % len(usual)]})
-    yield
-    os.sched_setaffinity(0, usual)
 
 
 @pytest.fixture

@@ -155,7 +155,7 @@ def compare(
 
 
 def read_interrupted_study(out: Path) -> StudySettings:
-    """Return the study in a folder; raises InputError if there is none."""
+    """Return the settings of the study in a folder; raises InputError if the folder contains no study."""
     settings = read_manifest(out).settings
     if settings is None:
         raise InputError(f"{str(out)!r} contains no study to resume (study.json); omit --resume to start one")

@@ -36,7 +36,7 @@ class Variant:
 
 
 PROBLEM = "problem"  # in the text of a variant, names another problem
-FREE = "-free"  # ends the names of problems with free joints
+FREE_JOINTS = ("nao-ssp-free", "nao-dsp-free")  # problems whose starts are fitted to a planned motion
 
 # The features of ``nlp_gait.gaits.biped.motors``; the first variant is the paper's.
 MOTORS = tuple(
@@ -68,7 +68,7 @@ def list_trajectories(problem: GaitProblem) -> tuple[Variant, ...]:
         }
         return Variant(name=name, options=changed, alone=True)
 
-    free = problem.name + FREE
+    free = f"{problem.name}-free"
     return (
         *(replace(make(order, order), alone=False) for order in ORDERS),
         make(f"{ORDERS[-1]}, few samples", ORDERS[-1], 1),
@@ -176,7 +176,7 @@ class Variants(Question[tuple[SolvedVariant, ...]]):
             x = convert_motion(solution.x, problem)
             if x is not None:
                 return solution.name, np.clip(x, problem.lower, problem.upper)
-        if feasible and problem.name.endswith(FREE):
+        if feasible and problem.name in FREE_JOINTS:
             from nlp_gait.gaits.nao.free_joints import fit_joints
 
             planned = load_variant(self.problem, variants[feasible[0].name])

@@ -16,11 +16,8 @@ SPECIAL = str.maketrans(
     {c: rf"\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}", "\\": r"\textbackslash{}"}
 )
 UNKNOWN = "--"
-MARKS = {
-    1: "$+$",
-    0: "$=$",
-    -1: "$-$",
-}  # of a solver that the subject is better than, not different from, or worse than
+# Of a solver than which the subject is significantly better, from which it does not differ, or than which it is worse.
+MARKS = {1: "$+$", 0: "$=$", -1: "$-$"}
 LEAST_DECIMALS, MOST_DECIMALS = 4, 10
 
 
@@ -117,7 +114,7 @@ def describe_run_counts(comparison: Comparison) -> str:
     stops = [record.inputs.stop for record in comparison.records]
     budgets = sorted({stop["evaluations"] for stop in stops if "evaluations" in stop})
     count = " to ".join(map(str, dict.fromkeys((runs[0], runs[-1]))))
-    budget = f", at most {join_words(f'{count:,}' for count in budgets)} evaluations of a search" if budgets else ""
+    budget = f", at most {join_words(f'{budget:,}' for budget in budgets)} evaluations of a search" if budgets else ""
     return f"n = {count} runs of each solver{budget}"
 
 

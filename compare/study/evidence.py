@@ -282,8 +282,8 @@ def check_code(case: CheckedRun) -> str | None:
     code = record.inputs.code, record.origin.casadi
     if code == case.code:
         return None
-    code_words, usual = (f"{digest[:8]}, CasADi {casadi}" for digest, casadi in (code, case.code))
-    return f"it was computed by other code ({code_words}) than the others ({usual})"
+    actual, usual = (f"{digest[:8]}, CasADi {casadi}" for digest, casadi in (code, case.code))
+    return f"it was computed by other code ({actual}) than the others ({usual})"
 
 
 def check_between_samples(case: CheckedRun) -> str | None:

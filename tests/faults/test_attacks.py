@@ -1,6 +1,7 @@
 """Forged studies that are consistent in themselves are not called whole, and no user code judges itself."""
 
 import json
+import os
 import re
 import shutil
 from collections.abc import Callable, Iterator
@@ -32,6 +33,19 @@ SETTINGS = StudySettings(
     starts=3,
     stop=Stop(evaluations=300),
 )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_core() -> Iterator[None]:
+    """Let these tests see one processor: they repeat few runs, and each process would import and build everything again."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    usual = os.sched_getaffinity(0)
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    os.sched_setaffinity(0, {sorted(usual)[worker % len(usual)]})
+    yield
+    os.sched_setaffinity(0, usual)
 
 
 @pytest.fixture(scope="module")

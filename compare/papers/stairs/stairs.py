@@ -73,7 +73,7 @@ def list_depths(results: StairsResults) -> list[float]:
     for case, (signals, legs) in results.motions.items():
         lifted = signals.arrays["t"] > results.best(case).x["t2_s"]
         depths.append(printed.measure_depths(TABLE_4[case], legs, lifted))
-    return [depth for depths_of_case in zip(*depths, strict=True) for depth in depths_of_case]
+    return [depth for of_all_cases in zip(*depths, strict=True) for depth in of_all_cases]
 
 
 def list_climbs(results: StairsResults, key: str) -> list[float] | None:

@@ -45,7 +45,7 @@ class Impact(Switch):
         """Return the velocities right after it, of the hip and of every coordinate, and that of the landing foot before it."""
         fastest, words = body.scale_time(LANDING_M_S * body.swing_speed), "forward velocity of the landing foot"
         speed = Variable(name=LANDING, unit="m/s", lower=0.0, upper=fastest, description=words)
-        return [*make_rates(body), speed]
+        return [*make_rate_variables(body), speed]
 
     def read_landing_speed(self, point: InstantPoint) -> SX:
         """Return the forward velocity at which the swinging foot lands [m/s]."""
@@ -69,7 +69,7 @@ class Impact(Switch):
         single, double = (replace(phases[kind], limits=(ReadRates(),)) for kind in (Support.SINGLE, Support.DOUBLE))
         body = single.body
         landing = single.sample(point, ops, MX(1.0)).read("all_qd")[:, 0]
-        variables = make_rates(body)
+        variables = make_rate_variables(body)
         names = [variable.name for variable in variables]
         # The rates of joints are linear in the planned velocities: one instant for each unit velocity.
         units = [point.with_values({name: MX(float(name == unit)) for name in names}) for unit in names]
@@ -88,8 +88,8 @@ class Impact(Switch):
         }
 
 
-def make_rates(body: Body) -> list[Variable]:
-    """Return the variables of the velocities right after it, of the hip and of every coordinate."""
+def make_rate_variables(body: Body) -> list[Variable]:
+    """Return the variables of the velocities right after an impact, of the hip and of every coordinate."""
     return [v for v in make_state_variables(body, AFTER, "touch_down") if v.unit in ("m/s", "rad/s")]
 
 

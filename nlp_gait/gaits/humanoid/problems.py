@@ -71,7 +71,7 @@ def humanoid_cycle(robot: HumanoidOptions, options: CycleOptions) -> GaitProblem
 
 @maker
 def humanoid_walk(robot: HumanoidOptions, options: WalkOptions, stairs: Stairs) -> GaitProblem:
-    """Whole walk from standing to standing, see ``WalkOptions``.
+    """Whole walk from standing to standing: weight shift, half step, steps, half step, weight shift.
 
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.

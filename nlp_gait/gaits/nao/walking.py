@@ -23,7 +23,9 @@ def nao_cycle(robot: NaoMotorOptions, options: CycleOptions) -> GaitProblem:
 
 @maker
 def nao_walk(robot: NaoMotorOptions, options: WalkOptions) -> GaitProblem:
-    """Whole walk of NAO from standing to standing, see ``WalkOptions``; angles of its footholds are 0: one motor turns both feet.
+    """Whole walk of NAO from standing to standing: weight shift, half step, steps, half step, weight shift.
+
+    Angles of its footholds are 0: one motor turns both feet.
 
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.

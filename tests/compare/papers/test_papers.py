@@ -18,7 +18,7 @@ from docs.pages.papers import RECORDS, paper_page
 from nlp_gait.errors import OutputError
 
 Quick = Callable[[str], tuple[Path, dict[str, Any]]]
-# IPOPT's starts from printed solutions alone: they are the ones that decide.
+# IPOPT starts from the printed solutions alone, which decide the verdicts.
 FEWER = {"nao": {"starts": 0}}
 
 
