@@ -143,12 +143,12 @@ def check_plain(data: Any) -> None:
         where, value, level = waiting.pop()
         if level > DEEPEST:
             raise ValueError(f"it nests deeper than {DEEPEST} levels")
-        if isinstance(value, Mapping):
+        if isinstance(value, (list, tuple)):
+            waiting += [(f"{where}[{i}]", inner, level + 1) for i, inner in enumerate(value)]
+        elif isinstance(value, Mapping):
             for key, inner in value.items():
                 _check_leaf(f"a key of {where}" if where else "a key", key)
                 waiting.append((f"{where}.{key}" if where else str(key), inner, level + 1))
-        elif isinstance(value, (list, tuple)):
-            waiting += [(f"{where}[{i}]", inner, level + 1) for i, inner in enumerate(value)]
         else:
             _check_leaf(where or "the value", value)
 
@@ -295,19 +295,20 @@ def _reject_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _check_leaf(where: str, value: Any) -> None:
-    place = _shorten(where)
-    if isinstance(value, str):
+    reason = ""
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            reason = f"must be finite, got {value}"
+    elif isinstance(value, str):
         if not value.isascii() and not value.isprintable() and any("\ud800" <= sign <= "\udfff" for sign in value):
-            raise ValueError(f"{place!r} contains an unpaired surrogate, got {_shorten(value)!r}")
-    elif isinstance(value, bool) or value is None:
-        return
+            reason = f"contains an unpaired surrogate, got {_shorten(value)!r}"
     elif isinstance(value, int):
         if abs(value) > LARGEST_INTEGER:
-            raise ValueError(f"{place!r} must be within 64 bits, got a whole number of {value.bit_length()} bits")
-    elif not isinstance(value, float):
-        raise ValueError(f"{place!r} must be a text, a number, a list or a table, got {type(value).__name__}")
-    elif not math.isfinite(value):
-        raise ValueError(f"{place!r} must be finite, got {value}")
+            reason = f"must be within 64 bits, got a whole number of {value.bit_length()} bits"
+    elif value is not None:
+        reason = f"must be a text, a number, a list or a table, got {type(value).__name__}"
+    if reason:
+        raise ValueError(f"{_shorten(where)!r} {reason}")
 
 
 def _shorten(text: str) -> str:

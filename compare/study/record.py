@@ -190,7 +190,7 @@ def parse_record(raw: Any) -> RunRecord:
     if math.isnan(record.verdict.violation):
         record = replace(record, verdict=replace(record.verdict, violation=math.inf))
     decode(StoredProblem, record.inputs.problem, "inputs.problem")
-    plain = json.loads(json.dumps(replace_nan(record)))
+    plain = replace_nan(record)
     places = [(plain, raw), *((plain[name], raw.get(name, {})) for name in ("verdict", "history", "time_s"))]
     if plain["inputs"] != raw["inputs"] or any(whole.keys() - stored.keys() - OPTIONAL for whole, stored in places):
         raise ValueError("it must have every field, defaults too")  # a default would be another run's

@@ -22,6 +22,7 @@ from nlp_gait.backends.identity import hash_json, identify_problem, make_key
 from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solver
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
+from nlp_gait.files import replace_nan
 from nlp_gait.formulation import GaitProblem, Objective
 from nlp_gait.formulation.registry import check_options, find_maker, hash_files, load, resolve_name
 from nlp_gait.providers import PROBLEMS
@@ -171,7 +172,7 @@ class Inputs:
         solver = self.solver
         if isinstance(solver, Mapping) and "name" in solver:
             solver = {**solver, "name": shorten_name(solver["name"])}
-        return {**asdict(self), "problem": make_key(self.problem), "solver": solver}
+        return {**replace_nan(self), "problem": make_key(self.problem), "solver": solver}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -44,7 +44,14 @@ class ExactModel:
     @lock_casadi
     def at(self, x: Sequence[float] | Array, p: Array) -> ExactValues:
         """Return the values at x (n,) and parameter values p (k,)."""
-        outputs = (np.array(value).ravel() for value in self.function(np.asarray(x), p))
+        outputs = [np.empty(self.function.numel_out(i)) for i in range(self.function.n_out())]
+        buffer, call = self.function.buffer()  # 1 ms faster than converting to CasADi's matrices and back
+        for i, given in enumerate((x, p)):
+            argument = np.ascontiguousarray(given, dtype=float).reshape(self.function.numel_in(i))
+            buffer.set_arg(i, memoryview(argument))
+        for i, output in enumerate(outputs):
+            buffer.set_res(i, memoryview(output))
+        call()
         cost, violation, g, lower, upper, indexes = outputs
         if np.isnan(lower).any() or np.isnan(upper).any():  # CasADi's fmax ignores it
             violation = np.full(1, math.nan)
@@ -53,25 +60,26 @@ class ExactModel:
 
     def find_violated(self, values: ExactValues) -> tuple[ConstraintValue, ...]:
         """Return the rows that are violated by more than the tolerance, worst first; NaN is the worst."""
-        violated = np.flatnonzero(~(_compute_violations(values) <= FEASIBILITY_TOLERANCE))
+        violated = np.flatnonzero(~(_compute_violations(values) <= FEASIBILITY_TOLERANCE)).tolist()
         return find_violated_rows(self.rows(values, violated))
 
-    def rows(self, values: ExactValues, chosen: Iterable[int] | None = None) -> tuple[ConstraintValue, ...]:
+    def rows(self, values: ExactValues, chosen: Sequence[int] | None = None) -> tuple[ConstraintValue, ...]:
         """Return all rows, or chosen ones, with their names and units."""
-        violations, rows = _compute_violations(values), []
-        for k in range(len(self.row_names)) if chosen is None else chosen:
-            low, high = (float(end[k]) if math.isfinite(end[k]) else None for end in (values.lower, values.upper))
-            rows.append(
-                ConstraintValue(
-                    name=self.row_names[k],
-                    value=float(values.g[k]),
-                    lower=low,
-                    upper=high,
-                    violation=float(violations[k]),
-                    unit=self.row_units[k],
-                )
+        chosen = range(len(self.row_names)) if chosen is None else chosen
+        columns = (values.g, values.lower, values.upper, _compute_violations(values))
+        return tuple(
+            ConstraintValue(
+                name=self.row_names[k],
+                value=value,
+                lower=lower if math.isfinite(lower) else None,
+                upper=upper if math.isfinite(upper) else None,
+                violation=violation,
+                unit=self.row_units[k],
             )
-        return tuple(rows)
+            for k, value, lower, upper, violation in zip(
+                chosen, *(column[chosen].tolist() for column in columns), strict=True
+            )
+        )
 
 
 def build_exact_model(problem: GaitProblem) -> ExactModel:
@@ -105,7 +113,9 @@ def _build(problem: GaitProblem) -> ExactModel:
     violation = ca.sum1(violations / scale)
     outputs = {"cost": cost, "violation": violation, "g": g, "lower": lower, "upper": upper}
     outputs["indexes"] = ca.vertcat(*assembly.indexes.values())
-    function = ca.Function("exact", [point.x, point.p], list(outputs.values()), ["x", "p"], list(outputs))
+    function = ca.Function(
+        "exact", [point.x, point.p], [ca.densify(value) for value in outputs.values()], ["x", "p"], list(outputs)
+    )
     names = [name for c in constraints for name in c.row_names]
     units = [c.unit for c in constraints for _ in c.row_names]
     names += [f"bounds[{name}]" for name in problem.names]

@@ -8,7 +8,7 @@
 // by the nearest line (Chebyshev). Where an operation is undefined on part of a box, the result is the whole line.
 
 #define LANES 8
-#define EACH for (int l = 0; l < LANES; ++l)
+#define EACH _Pragma("GCC ivdep") for (int l = 0; l < LANES; ++l)
 
 // Numbers of CasADi's operations, and two of our own (see HALF_OPEN_* in affine.py).
 enum Operation {
@@ -312,6 +312,9 @@ static inline void settle(View z) {
     lo[l] = below > lo[l] ? below : lo[l];
     hi[l] = above < hi[l] ? above : hi[l];
   }
+  bool regular = true;
+  EACH regular &= (reached[l] < INFINITY) & (lo[l] <= hi[l]);
+  if (regular) return;
   EACH if (!(reached[l] < INFINITY) || !(lo[l] <= hi[l])) {
     if (!(lo[l] <= hi[l])) lo[l] = -INFINITY, hi[l] = INFINITY;
     const Line line = constant(z.range(l));

@@ -9,6 +9,7 @@
 #include <initializer_list>
 
 #define EXPORT __attribute__((visibility("default")))
+#define INLINED __attribute__((always_inline))
 #define LIBM_UNITS 4.0
 
 struct Interval {
@@ -19,8 +20,8 @@ struct Interval {
 };
 
 static inline double down(double s, double units = 1.0) {
-  if (s == -INFINITY) return s;
-  return s == INFINITY ? __DBL_MAX__ : s - (units * 0x1p-52 * __builtin_fabs(s) + units * 0x1p-1074);
+  const double below = s - (units * 0x1p-52 * __builtin_fabs(s) + units * 0x1p-1074);
+  return s == -INFINITY ? s : s == INFINITY ? __DBL_MAX__ : below;
 }
 static inline double up(double s, double units = 1.0) { return -down(-s, units); }
 static inline Interval whole() { return Interval(-INFINITY, INFINITY); }
@@ -31,20 +32,24 @@ static inline Interval outward(double lo, double hi, double units = 1.0) {
 static inline double least(double a, double b) { return b < a ? b : a; }
 static inline double most(double a, double b) { return b > a ? b : a; }
 static inline bool contains(Interval a, double s) { return a.lo <= s && s <= a.hi; }
-static inline bool is(Interval a, double s) { return a.lo == s && a.hi == s; }
+static inline bool is(Interval a, double s) { return (a.lo == s) & (a.hi == s); }
 
 static inline Interval operator-(Interval a) { return Interval(-a.hi, -a.lo); }
 static inline Interval operator+(Interval a, Interval b) { return outward(a.lo + b.lo, a.hi + b.hi); }
 static inline Interval operator-(Interval a, Interval b) { return a + -b; }
 
 // 0 times an infinite end is 0: an interval's end is a bound, not a value.
-static inline double product(double s, double t) { return s == 0.0 || t == 0.0 ? 0.0 : s * t; }
-static inline Interval operator*(Interval a, Interval b) {
-  if (is(a, 0.0) || is(b, 0.0)) return Interval(0.0);
-  if (is(a, 1.0)) return b;
-  if (is(b, 1.0)) return a;
+static inline double product(double s, double t) {
+  const double p = s * t;
+  return (s == 0.0) | (t == 0.0) ? 0.0 : p;
+}
+// Without branches, so that compilers multiply several intervals at once.
+static inline INLINED Interval operator*(Interval a, Interval b) {
   const double p = product(a.lo, b.lo), q = product(a.lo, b.hi), r = product(a.hi, b.lo), s = product(a.hi, b.hi);
-  return outward(least(least(p, q), least(r, s)), most(most(p, q), most(r, s)));
+  const double low = least(least(p, q), least(r, s)), high = most(most(p, q), most(r, s));
+  const bool bounded = low <= high, none = is(a, 0.0) | is(b, 0.0), second = is(a, 1.0), first = is(b, 1.0);
+  const double lo = bounded ? down(low) : -INFINITY, hi = bounded ? up(high) : INFINITY;
+  return Interval(none ? 0.0 : second ? b.lo : first ? a.lo : lo, none ? 0.0 : second ? b.hi : first ? a.hi : hi);
 }
 static inline Interval operator/(Interval a, Interval b) {
   if (contains(b, 0.0)) return whole();
