@@ -47,10 +47,9 @@ class ExactModel:
         outputs = [np.empty(self.function.numel_out(i)) for i in range(self.function.n_out())]
         buffer, call = self.function.buffer()  # 1 ms faster than converting to CasADi's matrices and back
         for i, given in enumerate((x, p)):
-            argument = np.ascontiguousarray(given, dtype=float).reshape(self.function.numel_in(i))
-            buffer.set_arg(i, memoryview(argument))
+            buffer.set_arg(i, np.ascontiguousarray(given, dtype=float).reshape(self.function.numel_in(i)).data)
         for i, output in enumerate(outputs):
-            buffer.set_res(i, memoryview(output))
+            buffer.set_res(i, output.data)
         call()
         cost, violation, g, lower, upper, indexes = outputs
         if np.isnan(lower).any() or np.isnan(upper).any():  # CasADi's fmax ignores it
