@@ -44,12 +44,14 @@ class ExactModel:
     @lock_casadi
     def at(self, x: Sequence[float] | Array, p: Array) -> ExactValues:
         """Return the values at x (n,) and parameter values p (k,)."""
-        outputs = [np.empty(self.function.numel_out(i)) for i in range(self.function.n_out())]
-        buffer, call = self.function.buffer()  # 1 ms faster than converting to CasADi's matrices and back
-        for i, given in enumerate((x, p)):
-            buffer.set_arg(i, np.ascontiguousarray(given, dtype=float).reshape(self.function.numel_in(i)).data)
-        for i, output in enumerate(outputs):
-            buffer.set_res(i, output.data)
+        function = self.function
+        inputs = [np.ascontiguousarray(v, dtype=float).reshape(function.numel_in(i)) for i, v in enumerate((x, p))]
+        outputs = [np.empty(function.numel_out(i)) for i in range(function.n_out())]
+        buffer, call = function.buffer()  # 1 ms faster than converting to CasADi's matrices and back; it keeps no array
+        for i, array in enumerate(inputs):
+            buffer.set_arg(i, array.data)
+        for i, array in enumerate(outputs):
+            buffer.set_res(i, array.data)
         call()
         cost, violation, g, lower, upper, indexes = outputs
         if np.isnan(lower).any() or np.isnan(upper).any():  # CasADi's fmax ignores it
