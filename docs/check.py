@@ -109,16 +109,14 @@ def list_shown_faults(site: Path) -> list[str]:
     with start_browser() as browser:
         for turn, screen in enumerate(SCREENS):
             examined = list_examined(paths, turn)
-            # Axe requests style sheets: on a page whose messages are not read.
-            with open_screen(browser, screen) as opened, open_screen(browser, screen) as second:
+            with open_screen(browser, screen) as opened:
                 for path in paths:
                     show(opened, path)
                     found = [f"says {message!r}" for message in opened.messages]
                     found += [f"requests {url}" for url in opened.requests if not url.startswith(site.as_uri())]
                     found += [f"has a part that is too wide: {part}" for part in list_wide_parts(opened.page)]
                     if path in examined:
-                        show(second, path)
-                        found += [f"is hard to access: {fault}" for fault in list_accessibility_faults(second.page)]
+                        found += [f"is hard to access: {fault}" for fault in list_accessibility_faults(opened.page)]
                     faults += [f"{path.relative_to(site)}, {screen}: {fault}" for fault in found]
     return faults
 

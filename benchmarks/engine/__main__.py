@@ -10,20 +10,17 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable
 
-from benchmarks.engine import agreement, feedback, other_robots, rotors, sensitivity
+from benchmarks.engine import agreement, feedback, other_robots, sensitivity
 
 TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "waterfall": agreement.waterfall,
     "speeds": agreement.speeds,
-    "far": agreement.far,
     "ranking": agreement.ranking,
     "published": agreement.published,
     "gains": sensitivity.gains,
     "disturbed": feedback.disturbed,
     "feedback": feedback.settings,
-    "rotors": rotors.rotors,
     "stairs": other_robots.stairs,
-    "other-gains": other_robots.other_gains,
 }
 
 

@@ -17,7 +17,7 @@ from nlp_gait.simulation.measurements import Measurements, Walk, measure, measur
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import simulate_plan
 
-STEPS, MANY_STEPS = 10, 30
+STEPS = 10
 RANDOM = 30
 held = partial(Drive, feed_forward="none")
 # From simple to complete drives.
@@ -117,18 +117,6 @@ def speeds() -> Iterator[str]:
             f"{m.largest_tilt_deg:.1f}",
             f"{simulated / took:.1f}",
         )
-
-
-def far() -> Iterator[str]:
-    """Thirty steps at three speeds."""
-    yield header("m/s", "J per planned m", "model", "J per walked m", "distance", "drift mm", "heading deg")
-    for speed in (0.02, 0.05, 0.1):
-        walk = simulate_walk(optimal_cycles()[speed], MANY_STEPS)
-        drift, heading = (
-            "-" if value is None else f"{value:.2f}"
-            for value in (None if walk.drift_m is None else 1e3 * walk.drift_m, walk.heading_deg)
-        )
-        yield cells(f"{speed:g}", *format_energies(walk), drift, heading)
 
 
 def ranking() -> Iterator[str]:

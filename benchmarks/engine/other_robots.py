@@ -4,29 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 import nlp_gait
 from benchmarks.engine.markdown import cells, header
-from benchmarks.engine.sensitivity import engine_step
 from compare.papers.stairs.printed import TABLE_3 as STAIRS_TABLE_3
 from compare.papers.stairs.printed import TABLE_4 as STAIRS_TABLE_4
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Measurements, measure
 from nlp_gait.simulation.plan import make_plan
-from nlp_gait.simulation.simulate import Conditions, simulate_plan
+from nlp_gait.simulation.simulate import simulate_plan
 
 CASE = 2  # of Table IV, the problems' default
 # What the ideal step keeps in reserve: ZMP 4 cm inside the foot, 100 N on it, friction that exists.
 RESERVES = {"zmp_margin_m": 0.04, "least_stance_force_N": 100.0, "stance_friction": 0.6}
-VARIANTS = {
-    "default": Drive(),
-    **{f"largest torque at {error:g} rad": Drive(full_error_rad=error) for error in (0.16, 0.04)},
-    **{f"damping / stiffness {seconds:g} s": Drive(time_constant_s=seconds) for seconds in (0.01, 0.05)},
-    "velocity feed-forward only": Drive(feed_forward="velocity"),
-    "no feed-forward": Drive(feed_forward="none"),
-}
 
 
 def stairs() -> Iterator[str]:
@@ -46,27 +36,6 @@ def stairs() -> Iterator[str]:
             *("-" if v is None else f"{1e3 * v:.1f}" for v in (m.pressure_rms_m, m.pressure_middle_rms_m)),
             f"{landing:.1f}",
         )
-
-
-def other_gains() -> Iterator[str]:
-    """How the climb fares with other gains, feed-forward, friction and steps of the engine."""
-    climb = make_plan(optimal_climb(nlp_gait.load("stairs-plan")))
-    yield header("variant", "stairs-plan J", "result", "CoP, middle mm")
-
-    def row(label: str, drive: Drive, conditions: Conditions | None = None) -> str:
-        m = measure(climb, simulate_plan(climb, conditions, drive), drive)
-        return cells(
-            label,
-            "-" if m.fallen else f"{m.measured.mechanical_W * climb.duration_s:.1f}",
-            describe_result(m),
-            f"{1e3 * (m.pressure_middle_rms_m or np.nan):.1f}",
-        )
-
-    for label, drive in VARIANTS.items():
-        yield row(label, drive)
-    yield row("friction 0.4", Drive(), Conditions(friction=0.4))
-    with engine_step(0.00025):
-        yield row("engine step 0.25 ms", Drive())
 
 
 def describe_result(m: Measurements) -> str:
