@@ -1,9 +1,7 @@
 """Algorithms of other packages, differential evolution and L-SHADE."""
 
-import subprocess
 import sys
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,13 +30,6 @@ def test_a_package_that_is_missing_is_named_and_left_out_of_all(monkeypatch: pyt
             SearchError, match=rf"'{name}' needs the package {package}.*pip install 'nlp-gait\[algorithms\]'"
         ):
             make_algorithm(name)
-
-
-def test_importing_the_package_imports_none_of_them() -> None:
-    program = "import sys, metaheuristics; print(*sorted(sys.modules))"
-    root = Path(__file__).parents[2]
-    done = subprocess.run([sys.executable, "-c", program], cwd=root, capture_output=True, text=True, timeout=60)
-    assert not {"cma", "pymoo", "scipy"} & set(done.stdout.split())
 
 
 def test_settings_of_pymoos_own_are_passed_on() -> None:

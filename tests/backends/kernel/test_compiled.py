@@ -1,7 +1,6 @@
 """The compiled objective: the virtual machine's numbers at every lane count, whatever the batch, the threads or the memory."""
 
 import functools
-import sys
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -158,15 +157,12 @@ def test_a_problem_solved_by_hand(lanes: int) -> None:
     assert objective.row_names == ("row", "bounds[x]", "bounds[y]")
 
 
-def test_interpreted_gives_the_same(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+def test_interpreted_gives_the_same(request: pytest.FixtureRequest, caplog: pytest.LogCaptureFixture) -> None:
     problem = problem_named("nao-ssp")
     X = candidates(problem, 70)
     X[3, 0] = np.nan
     compiled = read_objective("nao-ssp")
-    monkeypatch.setenv("PATH", "")
-    monkeypatch.setenv("CXX", "")
-    monkeypatch.setenv("CC", "")
-    monkeypatch.setitem(sys.modules, "ziglang", None)
+    request.getfixturevalue("without_compiler")
     interpreted = compile_objective(problem)
     assert (compiled.backend, interpreted.backend) == ("compiled", "interpreted")
     assert len(caplog.messages) == 1
