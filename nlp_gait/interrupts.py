@@ -55,7 +55,7 @@ def defer_interrupts() -> Iterator[Callable[[], bool]]:
 
     For compiled code that would swallow the exception: CasADi takes it for a failed evaluation and continues.
     """
-    with _count_interrupts(1) as presses:
+    with count_interrupts(1) as presses:
         yield lambda: bool(presses)
 
 
@@ -75,20 +75,8 @@ def delay_interrupts() -> Iterator[None]:
 
 
 @contextmanager
-def remember_interrupts() -> Iterator[Callable[[], None]]:
-    """Yield a function that raises KeyboardInterrupt again if something inside has swallowed the one of Ctrl-C."""
-
-    def check() -> None:
-        if pressed:
-            raise KeyboardInterrupt
-
-    with _count_interrupts(0) as pressed:
-        yield check
-
-
-@contextmanager
-def _count_interrupts(deferred: int) -> Iterator[list[int]]:
-    """Yield the presses of Ctrl-C inside; all but the deferred first ones raise KeyboardInterrupt."""
+def count_interrupts(deferred: int = 0) -> Iterator[list[int]]:
+    """Yield the presses of Ctrl-C inside; all but the deferred first ones raise KeyboardInterrupt, which code may swallow."""
     presses: list[int] = []
 
     def count(number: int, frame: FrameType | None) -> None:

@@ -19,9 +19,9 @@ from nlp_gait.backends.exact import ExactValues, build_exact_model
 from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
 from nlp_gait.backends.solve import count_workers
 from nlp_gait.errors import GaitError, InputError, UserCodeError
+from nlp_gait.files import replace_nan
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.interrupts import never
 from nlp_gait.processes import run_in_forks
 
 T = TypeVar("T")
@@ -85,7 +85,7 @@ Check = Callable[[CheckedRun], str | None]
 def check_records(
     records: Sequence[RunRecord],
     *,
-    find_problem: Callable[[RunRecord], GaitProblem] | None = None,
+    find_problem: Callable[[RunRecord], GaitProblem] = load_problem,
     between_samples: Scope = "best",
 ) -> CheckedRecords:
     """Check records against their points, proofs, each other and the code that made them.
@@ -96,7 +96,7 @@ def check_records(
         between_samples: for which runs the verdict between the samples is repeated, a tenth of a second each: for the best one of
             every solver, all or none.
     """
-    cases = _make_cases(records, find_problem or load_problem)
+    cases = _make_cases(records, find_problem)
     for case in cases:
         case.reasons += filter(None, (check(case) for check in CHECKS))
     chosen = list(_choose_cases(cases, between_samples))
@@ -109,7 +109,7 @@ def check_records(
 
 
 def read_evidence(
-    folder: Path, between_samples: Scope = "best", find_problem: Callable[[RunRecord], GaitProblem] | None = None
+    folder: Path, between_samples: Scope = "best", find_problem: Callable[[RunRecord], GaitProblem] = load_problem
 ) -> CheckedRecords:
     """Read and check the records of a study.
 
@@ -132,16 +132,10 @@ def name_record(record: RunRecord) -> str:
     return f"{record.problem}, {record.solver}, run {record.run}"
 
 
-def compute_in_forks(call: Callable[[T], R], items: Sequence[T], stop: Callable[[], bool] = never) -> Iterator[R]:
-    """Yield call(item) of each item in order, in forks where they pay; after ``stop`` returns True, no further one is begun."""
+def compute_in_forks(call: Callable[[T], R], items: Sequence[T]) -> Iterator[R]:
+    """Return call(item) of each item in order, in forks where they pay."""
     workers = min(count_workers(), len(items) // 2)
-    if workers > 1:
-        yield from run_in_forks(lambda k, _: call(items[k]), len(items), workers, stop)
-        return
-    for item in items:
-        if stop():
-            return
-        yield call(item)
+    return run_in_forks(lambda k, _: call(items[k]), len(items), workers) if workers > 1 else map(call, items)
 
 
 def is_same(a: float, b: float, scale: float = 0.0) -> bool:
@@ -212,22 +206,16 @@ def check_problem(case: CheckedRun) -> str | None:
 def check_verdict(case: CheckedRun) -> str | None:
     """Compare the verdict with what is evaluated at x; a run without a point has none."""
     record, verdict, exact = case.record, case.record.verdict, case.exact
-    judged = verdict.feasible or math.isfinite(verdict.objective) or verdict.indexes or verdict.dense
     if not record.x:
-        return "it has a verdict, but no point" if judged or verdict.guaranteed else None
+        return None if replace_nan(verdict) == replace_nan(Verdict()) else "it has a verdict, but no point"
     if exact is None:
         return None
+    objective = record.inputs.objective.sign * exact.cost
     violation = math.inf if math.isnan(exact.violation) else exact.violation
-    pairs = {"objective": (verdict.objective, record.inputs.objective.sign * exact.cost, 0.0)}
-    pairs["violation"] = verdict.violation, violation, 1.0
-    if verdict.indexes:
-        if verdict.indexes.keys() != exact.indexes.keys():
-            return "its indexes have other names than those of the problem"
-        pairs |= {f"index {name}": (verdict.indexes[name], value, 1.0) for name, value in exact.indexes.items()}
     differences = [
-        f"its {name} is {stated:.9g}, but that of its x is {value:.9g}"
-        for name, (stated, value, scale) in pairs.items()
-        if not is_same(stated, value, scale)
+        *_list_differences({"objective": verdict.objective}, {"objective": objective}, scale=0.0),
+        *_list_differences({"violation": verdict.violation}, {"violation": violation}),
+        *_list_differences(verdict.indexes, exact.indexes),
     ]
     if verdict.feasible != (verdict.violation <= FEASIBILITY_TOLERANCE):
         word = "feasible" if verdict.feasible else "infeasible"
@@ -291,7 +279,7 @@ def check_between_samples(case: CheckedRun) -> str | None:
     assert case.problem is not None  # for the type checker
     stated = case.record.verdict
     again = Verdict.from_evaluation(evaluate(case.problem, case.problem.check_x(case.record.x)))
-    if stated.dense_feasible != again.dense_feasible or not _are_same(stated.dense, again.dense):
+    if stated.dense_feasible != again.dense_feasible or _list_differences(stated.dense or {}, again.dense or {}):
         return "its verdict on the dense grid does not follow from its x"
     words = ["nothing" if v.guaranteed is None else v.guaranteed.word for v in (stated, again)]
     if words[0] != words[1]:
@@ -301,10 +289,15 @@ def check_between_samples(case: CheckedRun) -> str | None:
     return None
 
 
-def _are_same(a: Mapping[str, float] | None, b: Mapping[str, float] | None) -> bool:
-    if a is None or b is None:
-        return a is b
-    return a.keys() == b.keys() and all(is_same(a[name], b[name], 1.0) for name in a)
+def _list_differences(stated: Mapping[str, float], found: Mapping[str, float], scale: float = 1.0) -> list[str]:
+    """Return which stated values are not those of a point."""
+    if stated.keys() != found.keys():
+        return ["its indexes have other names than those of the problem"]
+    return [
+        f"its {name} is {stated[name]:.9g}, but that of its x is {value:.9g}"
+        for name, value in found.items()
+        if not is_same(stated[name], value, scale)
+    ]
 
 
 CHECKS: tuple[Check, ...] = (check_problem, check_verdict, check_bound, check_history, check_settings, check_code)

@@ -18,7 +18,7 @@ from compare.study.settings import list_runs
 from compare.study.task import Task, check_task
 from nlp_gait.errors import GaitError, InputError, NoWorkersError, OutputError, WorkerError
 from nlp_gait.files import convert_errors, make_writable_folder, remove_leftovers
-from nlp_gait.interrupts import Interrupted, delay_interrupts, remember_interrupts
+from nlp_gait.interrupts import Interrupted, count_interrupts, delay_interrupts
 from nlp_gait.processes import run_in_processes
 from nlp_gait.progress import Progress
 
@@ -44,9 +44,10 @@ def run_tasks(
     for position, (task, _) in enumerate(tasks):
         # A GaitProblem has symbols and functions, which cannot leave this process.
         if is_alone or not isinstance(task.problem.name, str):
-            with remember_interrupts() as check:
+            with count_interrupts() as presses:
                 record = try_task(*waiting.pop(position))
-                check()
+                if presses:  # user code has swallowed it
+                    raise KeyboardInterrupt
             yield position, record
     if waiting and scheduler is not None:
         yield from run_on_cluster(waiting, scheduler)
