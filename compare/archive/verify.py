@@ -60,10 +60,9 @@ class Finding(NamedTuple):
 
 
 class Verification(NamedTuple):
-    """All checks, the records that passed theirs, and two lines: what was evaluated and repeated, and what was not."""
+    """All checks, and two lines: what was evaluated and repeated, and what was not."""
 
     findings: list[Finding]
-    records: list[RunRecord]
     scope: tuple[str, ...] = ()
 
 
@@ -72,11 +71,8 @@ def verify_archive(path: Path, *, share: float | None = None, progress: Progress
     with make_temporary_folder("nlp-gait-verify-") as folder:
         manifest, differences = unpack_archive(path, folder)
         detail = "; ".join(differences) or f"{len(manifest.files)} files have their SHA-256 of the manifest"
-        verification = verify_folder(folder, share=share, robots=manifest.robots, progress=progress)
-        codes = _check_code_files(folder, verification.records)
-        return verification._replace(
-            findings=[Finding("manifest", not differences, detail), *verification.findings, *codes]
-        )
+        findings, scope = verify_folder(folder, share=share, robots=manifest.robots, progress=progress)
+        return Verification([Finding("manifest", not differences, detail), *findings], scope)
 
 
 def verify_folder(
@@ -92,7 +88,7 @@ def verify_folder(
         folder: of the study.
         share: of the runs that are repeated, drawn at random, from 0 to 1; None for one run of each solver and problem, and the
             run whose prices are shown.
-        robots: files that stand for the options of problems that name files, relative to the folder.
+        robots: files of an archive that stand for the options of problems that name files, relative to the folder.
         progress: receives a line for each repeated run.
     """
     places = {option: str(folder / file) for option, file in (robots or {}).items()}
@@ -103,7 +99,7 @@ def verify_folder(
     try:
         evidence, manifest = read_evidence(folder, "all", find_problem), read_manifest(folder)
     except InputError as error:
-        return Verification([Finding("records", False, str(error))], [])
+        return Verification([Finding("records", False, str(error))])
     records = evidence.records
     findings = list(_report_evidence(evidence))
     findings.append(_judge(FILE, lambda: _check_sessions(records, manifest)))
@@ -116,7 +112,8 @@ def verify_folder(
     scope = _describe_scope(folder, records, sum(f.holds is not None for f in repeated))
     wrong = [finding for finding in repeated if not finding.holds]
     same = [Finding("repeated runs", True, f"{len(repeated) - len(wrong)} have the same results, to the last bit")]
-    return Verification([*findings, rewritten, *wrong, *(same if len(wrong) < len(repeated) else [])], records, scope)
+    codes = [] if robots is None else _check_code_files(folder, records)
+    return Verification([*findings, rewritten, *codes, *wrong, *(same if len(wrong) < len(repeated) else [])], scope)
 
 
 def _judge(what: str, check: Callable[[], str]) -> Finding:

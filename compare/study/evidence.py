@@ -71,7 +71,6 @@ class CheckedRun:
     reasons: list[str] = field(default_factory=list)  #: why it is no evidence
     problem: GaitProblem | None = None  #: None if it cannot be loaded
     needs_code: bool = False  #: that the command does not name
-    objections: list[str] = field(default_factory=list)  #: to the problem or the point, which prevent an evaluation
     exact: ExactValues | None = None  #: at its x; None if not evaluated
     bound: float | None = None  #: proven: no feasible point has a better objective
     first: tuple[RunRecord, ...] = ()  #: with this label, with this solver, and with this seed of the solver
@@ -99,7 +98,7 @@ def check_records(
     cases = _make_cases(records, find_problem)
     for case in cases:
         case.reasons += filter(None, (check(case) for check in CHECKS))
-    chosen = list(_choose_cases(cases, between_samples))
+    chosen = _choose_cases(cases, between_samples)
     for case in {id(case.problem): case for case in chosen}.values():  # builds what the forks inherit
         check_between_samples(case)
     for case, reason in zip(chosen, compute_in_forks(check_between_samples, chosen), strict=True):
@@ -163,7 +162,7 @@ def _make_cases(records: Sequence[RunRecord], find_problem: Callable[[RunRecord]
 
 
 def _evaluate_points(cases: Sequence[CheckedRun], find_problem: Callable[[RunRecord], GaitProblem]) -> None:
-    """Fill in problem, bound and exact values of records with one problem, or why they cannot be evaluated."""
+    """Fill in problem, bound and exact values of records with one problem, or the reasons why they cannot be evaluated."""
     stored = cases[0].record.inputs.problem
     try:
         problem = find_problem(cases[0].record)
@@ -172,32 +171,31 @@ def _evaluate_points(cases: Sequence[CheckedRun], find_problem: Callable[[RunRec
     except (GaitError, ValueError) as error:
         for case in cases:
             case.needs_code = isinstance(error, UserCodeError)
-            case.objections.append(f"its problem cannot be evaluated: {error}")
+            case.reasons.append(f"its problem cannot be evaluated: {error}")
         return
     model = build_exact_model(problem)
     for case in cases:
         case.problem, case.bound = problem, bound
-        case.objections += [f"its problem has changed since: {difference}"] if difference else []
+        case.reasons += [f"its problem has changed since: {difference}"] if difference else []
         try:
             case.exact = model.at(problem.check_x(case.record.x), problem.p) if case.record.x else None
         except (GaitError, ValueError) as error:
-            case.objections.append(f"its point does not belong to the problem: {error}")
+            case.reasons.append(f"its point does not belong to the problem: {error}")
 
 
-def _choose_cases(cases: Sequence[CheckedRun], scope: Scope) -> Iterator[CheckedRun]:
-    """Yield the runs whose verdict between the samples is repeated."""
-    for group in group_by(cases, lambda c: (hash_json(c.record.inputs.problem), c.record.solver)).values():
-        chosen = {"none": [], "all": group, "best": [min(group, key=lambda case: case.record.cost)]}[scope]
-        for case in chosen:
-            if not case.reasons and case.record.x and (scope == "all" or math.isfinite(case.record.cost)):
-                yield case
+def _choose_cases(cases: Sequence[CheckedRun], scope: Scope) -> list[CheckedRun]:
+    """Return the runs whose verdict between the samples is repeated."""
+    evaluated = [case for case in cases if case.record.x and not case.reasons]
+    if scope == "best":
+        feasible = [case for case in evaluated if case.record.verdict.feasible]
+        groups = group_by(feasible, lambda c: (hash_json(c.record.inputs.problem), c.record.solver))
+        return [min(group, key=lambda case: case.record.cost) for group in groups.values()]
+    return evaluated if scope == "all" else []
 
 
-def check_problem(case: CheckedRun) -> str | None:
-    """Check that the problem is the same today, and that the point belongs to it."""
+def check_objective(case: CheckedRun) -> str | None:
+    """Compare the name, unit and sense of the objective with the problem's."""
     stated = case.record.inputs.objective
-    if case.objections:
-        return "; ".join(case.objections)
     if case.problem is not None and stated != case.problem.objective:
         return f"its objective is {stated}, that of the problem {case.problem.objective}"
     return None
@@ -300,4 +298,4 @@ def _list_differences(stated: Mapping[str, float], found: Mapping[str, float], s
     ]
 
 
-CHECKS: tuple[Check, ...] = (check_problem, check_verdict, check_bound, check_history, check_settings, check_code)
+CHECKS: tuple[Check, ...] = (check_objective, check_verdict, check_bound, check_history, check_settings, check_code)
