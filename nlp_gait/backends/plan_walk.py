@@ -3,7 +3,7 @@
 import math
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
-from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.ipopt import BARRIERS, IpoptSettings
 from nlp_gait.errors import InputError, check_count
 from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem, Result, load
@@ -308,17 +308,8 @@ def _load_cycle(problem: GaitProblem, step_m: float | None) -> GaitProblem:
 
 
 def _solve(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkSettings) -> WalkPlan:
-    """Solve a walk from start points, for which a cycle is solved first if it is given."""
-    rng, best = np.random.default_rng(0), None
-    solver = IpoptSettings(few_rows=False).prepare(problem, solves=MANY_SOLVES)
-    for k in range(check_count("starts", settings.starts)):
-        x0: Array = np.clip(problem.start_point(rng), problem.lower, problem.upper)
-        if cycle is not None:
-            gait = solve(cycle, seed=k, workers=1)
-            settings.progress(f"start {k + 1}, cycle: {gait.status}")
-            x0 = start_from_cycle(problem, x0, gait.x, float(problem.options.get("stair_rise_m", 0.0)))
-        solution = solve(problem, x0=x0, solver=solver, workers=1)
-        settings.progress(f"start {k + 1}: {solution.status}")
+    best: Solution | None = None
+    for solution in _run_starts(problem, cycle, settings):
         if best is None or solution.best.rank < best.best.rank:
             best = solution
         if best.converged:
@@ -327,6 +318,22 @@ def _solve(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkSettin
     indexes = build_exact_model(problem).at(best.best.x, problem.p).indexes
     numbers = {name: float(indexes[name]) for name in ("distance_m", "duration_s", "energy_J")}
     return WalkPlan(solution=best, **numbers)
+
+
+def _run_starts(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkSettings) -> Iterator[Solution]:
+    """Solve a walk from start points, by each barrier, for which a cycle is solved first if it is given."""
+    rng = np.random.default_rng(0)
+    for k in range(check_count("starts", settings.starts)):
+        x0: Array = np.clip(problem.start_point(rng), problem.lower, problem.upper)
+        if cycle is not None:
+            gait = solve(cycle, seed=k, workers=1)
+            settings.progress(f"start {k + 1}, cycle: {gait.status}")
+            x0 = start_from_cycle(problem, x0, gait.x, float(problem.options.get("stair_rise_m", 0.0)))
+        for barrier in BARRIERS:
+            solver = IpoptSettings(few_rows=False, barrier=barrier).prepare(problem, solves=MANY_SOLVES)
+            solution = solve(problem, x0=x0, solver=solver, workers=1)
+            settings.progress(f"start {k + 1}, {barrier} barrier: {solution.status}")
+            yield solution
 
 
 def describe_own_bounds(problem: GaitProblem, x: Mapping[str, float]) -> list[str]:

@@ -3,6 +3,7 @@
 import json
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +11,10 @@ import pytest
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.plan_walk import MARGINS, WalkPlan, WalkSettings, describe_violation, plan_walk
+from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result, load_result
-from nlp_gait.formulation.solution import ConstraintValue
+from nlp_gait.formulation.solution import ConstraintValue, Solution
 from nlp_gait.gaits.biped.footholds import list_arc
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.simulation.plan import make_plan
@@ -196,6 +198,22 @@ def test_a_violation_names_step_constraint_amount_and_remedy(row: str, sentence:
 def test_what_cannot_be_planned_is_refused(options: dict[str, float], words: str) -> None:
     with pytest.raises(InputError, match=words):
         plan_walk("nao-v5", **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("without_compiler")
+def test_a_start_that_fails_is_tried_again_with_a_monotone_barrier(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    quick, used = nlp_gait.IpoptSettings(iterations=1, compiled=False), list[Solver]()
+
+    def solve_badly_at_first(problem: GaitProblem, *, solver: Solver, **rest: Any) -> Solution:
+        used.append(solver)
+        return nlp_gait.solve(problem, solver=solver if used[1:] else quick, **rest)
+
+    monkeypatch.setattr("nlp_gait.backends.plan_walk.solve", solve_badly_at_first)
+    plan = plan_walk("nao-v5", 3, settings=WalkSettings(intervals=2, starts=1, progress=said.append))
+    assert plan.feasible and len(set(used)) == 2
+    assert [line.partition(":")[0] for line in said] == ["start 1, adaptive barrier", "start 1, monotone barrier"]
 
 
 @pytest.mark.slow

@@ -49,6 +49,7 @@ QUIET: Mapping[str, Any] = {
 }
 # Linear solvers that IPOPT knows; all but the last two load a library that the user must have.
 LINEAR_SOLVERS = ("ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "mumps", "spral")
+BARRIERS = ("adaptive", "monotone")  # IPOPT's ``mu_strategy``
 STATUS_WORDS = {
     "Solve_Succeeded": "converged",
     "Solved_To_Acceptable_Level": "converged to IPOPT's acceptable level only",
@@ -82,6 +83,8 @@ class IpoptSettings(Solver):
     #: Limit of wall time for all stages of a run [s]; selecting the rows of a large problem, once for all runs, has as much again
     time_limit_s: float = 300.0
     hessian: str | None = None  #: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem
+    #: how the first stage lowers its barrier: ``"adaptive"``, or ``"monotone"``, which may converge where the other does not
+    barrier: str = BARRIERS[0]
     #: whether the NLP's functions and derivatives are compiled; None: where that pays for the number of solves and there is a
     #: compiler
     compiled: bool | None = None
@@ -105,6 +108,8 @@ class IpoptSettings(Solver):
             raise InputError(f"widths must be positive and narrow from stage to stage, got {self.widths}")
         if self.hessian not in (None, "exact", "limited-memory"):
             raise InputError(f"hessian must be 'exact', 'limited-memory' or None, got {self.hessian!r}")
+        if self.barrier not in BARRIERS:
+            raise InputError(f"barrier must be one of {', '.join(BARRIERS)}, got {self.barrier!r}")
         if self.linear_solver not in (None, *LINEAR_SOLVERS):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
@@ -153,7 +158,7 @@ class Ipopt(Solver):
         self.watch = IterationWatch(model.nlp)
         general: dict[str, Any] = {
             **QUIET,
-            "ipopt.mu_strategy": "adaptive",
+            "ipopt.mu_strategy": settings.barrier,
             "ipopt.tol": settings.tolerance,
             "ipopt.bound_relax_factor": 0.0,  # else optima violate the exact limits
             "ipopt.max_iter": settings.iterations,

@@ -146,6 +146,7 @@ def test_an_iteration_limit_is_reported_as_such() -> None:
         ({"tolerance": np.nan}, "tolerance must be within"),
         ({"iterations": 0}, "iterations and time_limit_s must be positive, got 0"),
         ({"time_limit_s": np.nan}, "must be positive"),
+        ({"barrier": "fast"}, "barrier must be one of adaptive, monotone, got 'fast'"),
         ({"hessian": "none"}, "hessian must be 'exact', 'limited-memory' or None, got 'none'"),
     ],
 )
