@@ -12,6 +12,7 @@ from nlp_gait.backends.exact import build_exact_model, find_violated_rows
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 from nlp_gait.proofs.guarantee import Guarantee, guarantee
+from nlp_gait.proofs.time_search import MEAN_SHARPNESS
 
 DENSE_INTERVALS = 1000  # least number of intervals of the dense grid
 
@@ -49,11 +50,15 @@ class Evaluation:
 
 
 def evaluate(
-    problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, float], *, prove: bool = True
+    problem: GaitProblem,
+    x: Sequence[float] | Array | Mapping[str, float],
+    *,
+    prove: bool = True,
+    mean_sharpness: float = MEAN_SHARPNESS,
 ) -> Evaluation:
     """Return the exact values at x (n,), in the problem's order or by name; raises InputError for a wrong length or NaN.
 
-    Without ``prove`` nothing is proven of a feasible point: ``guaranteed`` is None.
+    Without ``prove`` nothing is proven of a feasible point: ``guaranteed`` is None; see ``guarantee`` for the sharpness.
     """
     point = problem.check_x(x)
     exact = build_exact_model(problem)
@@ -78,5 +83,7 @@ def evaluate(
         if dense is None or dense_values is None
         else build_exact_model(dense).find_violated(dense_values),
         dense_intervals=None if dense is None else factor * parts,
-        guaranteed=guarantee(problem, point) if prove and values.violation <= FEASIBILITY_TOLERANCE else None,
+        guaranteed=guarantee(problem, point, mean_sharpness)
+        if prove and values.violation <= FEASIBILITY_TOLERANCE
+        else None,
     )
