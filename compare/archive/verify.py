@@ -89,7 +89,7 @@ def verify_folder(
         share: of the runs that are repeated, drawn at random, from 0 to 1; None for one run of each solver and problem, and the
             run whose prices are shown.
         robots: files of an archive that stand for the options of problems that name files, relative to the folder.
-        progress: receives a line for each repeated run.
+        progress: receives a line when the texts are compared, and when a run is repeated.
     """
     places = {option: str(folder / file) for option, file in (robots or {}).items()}
 
@@ -107,7 +107,7 @@ def verify_folder(
     findings.append(_judge("runs", lambda: _check_plan(folder, manifest, everyone)))
     for number, path in enumerate(sorted((folder / "certificates").glob("*.json"))):
         findings.append(_judge(f"certificates/{path.name}", partial(_check_certificate, path, number)))
-    check_texts = partial(_judge, "texts", lambda: _check_texts(folder, records, manifest, evidence))
+    check_texts = partial(_judge, "texts", lambda: _check_texts(folder, manifest, evidence))
     rewritten, *repeated = _repeat_runs(records, share, places, progress, check_texts)
     scope = _describe_scope(folder, records, sum(f.holds is not None for f in repeated))
     wrong = [finding for finding in repeated if not finding.holds]
@@ -240,7 +240,7 @@ def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Findin
     return findings
 
 
-def _check_texts(folder: Path, records: Sequence[RunRecord], manifest: Manifest, evidence: CheckedRecords) -> str:
+def _check_texts(folder: Path, manifest: Manifest, evidence: CheckedRecords) -> str:
     """Write the report, its figures and tables again, and compare all that are there."""
     if not any((folder / name).exists() for name in PAGES):
         raise NotCheckedError("there is no report")
@@ -248,7 +248,7 @@ def _check_texts(folder: Path, records: Sequence[RunRecord], manifest: Manifest,
         raise NotCheckedError("the report needs the records of user code")
     with make_temporary_folder("nlp-gait-report-") as fresh:
         further = FurtherFiles(csv=(folder / "runs.csv").exists())
-        written = write_report(fresh, records, manifest, excluded=evidence.excluded, further=further)
+        written = write_report(fresh, evidence.records, manifest, excluded=evidence.excluded, further=further)
         missing = [path.name for path in written if not (folder / path.name).exists()]
         if missing:
             raise InputError(f"{_list_some(missing)} should be there")
@@ -306,20 +306,18 @@ def _repeat_runs(
 ) -> list[Finding]:
     """Return the finding about the texts, which are written next to the runs, and one for each repeated run."""
     chosen = _choose_runs(records, share)
-
-    def repeat(record: RunRecord) -> Finding:
-        progress(name_record(record))
-        return _judge(f"repeated: {name_record(record)}", lambda: _repeat_run(record, _move_files(record, places)))
-
-    for record in chosen:  # built before the forks
-        load_problem(_move_files(record, places))
-    calls: list[Callable[[], Finding]] = [check_texts, *(partial(repeat, record) for record in chosen)]
-    return list(compute_in_forks(call, calls))
+    repeats = (partial(_judge, f"repeated: {name_record(r)}", partial(_repeat_run, r, places)) for r in chosen)
+    checks: list[Callable[[], Finding]] = [check_texts, *repeats]
+    findings = []
+    for finding in compute_in_forks(call, checks):
+        progress(finding.what)
+        findings.append(finding)
+    return findings
 
 
-def _repeat_run(record: RunRecord, moved: RunRecord) -> str:
+def _repeat_run(record: RunRecord, places: Mapping[str, str]) -> str:
     """Repeat a run, whose files may have moved: the same seed gives the same bits."""
-    again = try_task(_make_task(record, moved.inputs))
+    again = try_task(_make_task(record, _move_files(record, places).inputs))
     recorded, repeated = record.to_json(), again.to_json()
     for what in (name for name in recorded if name not in NOT_REPEATED):
         before, now = (json.dumps(plain[what], sort_keys=True) for plain in (recorded, repeated))
