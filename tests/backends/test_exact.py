@@ -24,6 +24,12 @@ def test_cost_rows_and_violation_by_hand() -> None:
     assert out.upper == pytest.approx([np.inf, 2.0, 3.0])
 
 
+@pytest.mark.parametrize("x", [(0.0,), (0.0, 1.5, 1.0)])
+def test_a_point_of_another_length_is_refused(x: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match="reshape"):
+        evaluate(toy(corner), x)
+
+
 def test_a_candidate_outside_the_bounds_violates_them_in_units_of_their_range() -> None:
     out = evaluate(toy(corner), (3.0, 1.0))
     assert out.violation == pytest.approx(1.0 / 4.0)
