@@ -15,8 +15,6 @@ from tests.backends.toys import Mathematics, row, toy
 
 NAMES = ("nao-ssp", "nao-dsp")
 WIDTH = 1e-3
-# Central differences with a relative step of 1e-6 on functions of order one, whose third derivatives reach 1e3.
-DIFFERENCE_STEP, DIFFERENCE_TOLERANCE = 1e-6, 1e-5
 # Sums of the same products in another order.
 ROUNDING = 1e-9
 

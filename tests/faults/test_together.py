@@ -19,8 +19,6 @@ from compare.judge import evaluate
 from nlp_gait.formulation import GaitProblem
 from tests.faults.processes import ROOT
 
-EXAMPLE = ROOT / "examples" / "bring_your_own.py"
-
 
 @pytest.mark.slow
 def test_four_threads_solve_one_problem_and_build_it_once() -> None:

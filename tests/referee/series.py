@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-Number = "Series | Array | float"
 
 
 class Series:

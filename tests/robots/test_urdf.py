@@ -16,7 +16,6 @@ from nlp_gait.robots import load_robot
 from nlp_gait.robots.urdf import read_urdf
 from tests.robots.custom import about_joints, as_urdf, assert_same, humanoid, nao, partner, written
 
-ZERO = Rotation.identity()
 SET_EULER = {"LThigh": Rotation.from_euler("xyz", (0.3, -1.1, 2.0)), "LTibia": Rotation.from_euler("x", 1.5)}
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, GaitProblem, Signals, load
+from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.gaits.nao.leaning_torso import check_yaw_pitches
 from nlp_gait.robots import Robot, load_robot
 from tests.backends.toys import row_violations
@@ -16,8 +16,7 @@ from tests.pinocchio_oracle import check_halves, floating_model
 
 pin = pytest.importorskip("pinocchio")  # needs NumPy 2
 
-# Two double-precision algorithms on torques of some Nm, a ZMP and a pose.
-TORQUE_TOLERANCE_NM, ZMP_TOLERANCE_M, POSE_TOLERANCE = 1e-8, 1e-8, 1e-9
+POSE_TOLERANCE = 1e-9  # of two double-precision algorithms
 OWN = 8
 PAPER = (0.30, 0.006, 0.0006, 0.03, 0.03, -0.05, -0.05, 1.0)
 ANKLES_XY = {"L": (0.06, 0.05), "R": (0.12, -0.05)}
@@ -39,13 +38,6 @@ def leaning(seed: int, lean: float = 0.2) -> Array:
         size = lean if name.startswith(LEAN) else 0.01 if name.startswith("hip") else 0.3
         x[i] = size * rng.normal()
     return x
-
-
-def at(signals: Signals, sample: int) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
-    q, qd, qdd = (
-        dict(zip(signals.joints, signals.arrays[k][sample].tolist(), strict=True)) for k in ("q", "qd", "qdd")
-    )
-    return q, qd, qdd
 
 
 def ankle_of(robot: Robot, side: str) -> Array:

@@ -13,8 +13,6 @@ from tests.backends.toys import row_violations
 from tests.evaluation import check_power, evaluated
 from tests.pinocchio_oracle import check_standing, floating_model
 
-# Two double-precision algorithms on torques of some Nm, a ZMP and a pose.
-TORQUE_TOLERANCE_NM, ZMP_TOLERANCE_M, POSITION_TOLERANCE_M = 1e-8, 1e-8, 1e-12
 # Joint angles of a cubic hip and foot are smooth: with 8 spans a fit is this near in power.
 FIT_SHARE = 0.01
 OWN = 9

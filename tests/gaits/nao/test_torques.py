@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlp_gait.formulation import Array, GaitProblem, Signals, load
+from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
 from tests.pinocchio_oracle import check_halves, check_standing, floating_model, read_state, stand
@@ -28,13 +28,6 @@ def motions(problem: GaitProblem) -> list[Array]:
         np.array(FEASIBLE[problem.name]),
         *(np.random.default_rng(seed).uniform(problem.lower, problem.upper) for seed in SEEDS),
     ]
-
-
-def at(signals: Signals, sample: int) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
-    q, qd, qdd = (
-        dict(zip(signals.joints, map(float, signals.arrays[name][sample]), strict=True)) for name in ("q", "qd", "qdd")
-    )
-    return q, qd, qdd
 
 
 @pytest.mark.slow
