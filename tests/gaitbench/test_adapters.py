@@ -84,12 +84,3 @@ def test_a_package_that_lacks_is_named(
         instance.to(name)
     with pytest.raises(UnknownNameError, match=f"unknown adapter '{name}x'; did you mean '{name}'"):
         instance.to(f"{name}x")
-
-
-@pytest.mark.slow
-def test_loading_an_instance_imports_none_of_them() -> None:
-    import subprocess
-
-    program = "import sys; from nlp_gait import gaitbench; gaitbench.list_instances(); print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
-    assert not {"pymoo", "pygmo", "ioh", "cma", "scipy.optimize", "matplotlib"} & set(loaded)

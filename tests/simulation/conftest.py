@@ -17,6 +17,10 @@ GAITS = {
     "ssp falling": ("nao-ssp", (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.12, -0.12, 0.015, 4)),
 }
 
+# The least energy per metre, 19.149 J/m, to five digits; hip at lift-off, arms, hip at touch-down, arms, swing, times, step.
+CHEAPEST = (0.0019, 0.02108, 0.31, 0.09951, 0.09805, -0.01255, 0.0, 0.0)
+CHEAPEST += (0.04492, 0.0234, 0.30827, 0.09796, -0.05736, 0.02148, 0.0, 0.0, 0.015, 0.4, 0.56565, 0.07619)
+
 
 @pytest.fixture(scope="session")
 def gait():
@@ -28,3 +32,10 @@ def gait():
         return Result(problem=problem, x=problem.check_x(x))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def cycle() -> Result:
+    """The cheapest cycle of NAO."""
+    problem = nlp_gait.load("nao-cycle")
+    return Result(problem=problem, x=problem.check_x(CHEAPEST))

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result
 from nlp_gait.simulation.footholds import StepLimits, choose_step, clip_to_soles, find_shift
 from nlp_gait.simulation.plan import Plan, make_plan
-from tests.simulation.test_walking import CHEAPEST
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("daqp")
@@ -35,9 +33,8 @@ LIMITS = StepLimits(
 
 
 @pytest.fixture(scope="module")
-def plan() -> Plan:
-    problem = nlp_gait.load("nao-cycle")
-    return make_plan(Result(problem=problem, x=problem.check_x(CHEAPEST)), 2)
+def plan(cycle: Result) -> Plan:
+    return make_plan(cycle, 2)
 
 
 @pytest.mark.parametrize("error", [(0.04, 0.01), (-0.05, -0.03), (0.01, 0.0)])

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from casadi import DM, SX
 
-import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result
 from nlp_gait.robots.tree import make_tree
@@ -30,7 +29,6 @@ from nlp_gait.simulation.simulate import (  # noqa: E402
     prepare,
     simulate_plan,
 )
-from tests.simulation.test_walking import CHEAPEST  # noqa: E402
 
 NOISELESS = Feedback(position_noise_m=0.0, velocity_noise_m_s=0.0, tilt_noise_rad=0.0, rate_noise_rad_s=0.0)
 IDEAL = replace(NOISELESS, delay_s=0.0)
@@ -39,15 +37,13 @@ STEPS = 2
 
 
 @pytest.fixture(scope="module")
-def plan() -> Plan:
-    problem = nlp_gait.load("nao-cycle")
-    return make_plan(Result(problem=problem, x=problem.check_x(CHEAPEST)), STEPS)
+def plan(cycle: Result) -> Plan:
+    return make_plan(cycle, STEPS)
 
 
 @pytest.fixture(scope="module")
-def step() -> Plan:
-    problem = nlp_gait.load("nao-cycle")
-    return make_plan(Result(problem=problem, x=problem.check_x(CHEAPEST)), 1)
+def step(cycle: Result) -> Plan:
+    return make_plan(cycle, 1)
 
 
 @cache
@@ -146,10 +142,9 @@ def test_settings_that_no_controller_has_are_refused(name: str, value: float) ->
 
 
 @pytest.mark.slow
-def test_the_commands_take_feedback_and_conditions(plan: Plan, tmp_path: Path) -> None:
-    problem = nlp_gait.load("nao-cycle")
+def test_the_commands_take_feedback_and_conditions(cycle: Result, tmp_path: Path) -> None:
     result = tmp_path / "cycle.json"
-    result.write_text(json.dumps({"problem": "nao-cycle", "x": problem.by_name(np.array(CHEAPEST))}))
+    result.write_text(json.dumps({"problem": "nao-cycle", "x": cycle.problem.by_name(cycle.x)}))
     flags = ["--steps", "1", "--slope-deg=-3,0", "--stiffness-factor", "0.9"]
 
     def torques(*more: str) -> float:

@@ -19,9 +19,6 @@ from nlp_gait.simulation.measurements import measure_walk  # noqa: E402
 from nlp_gait.simulation.plan import make_plan  # noqa: E402
 from nlp_gait.simulation.simulate import simulate_plan  # noqa: E402
 
-# The least energy per metre, 19.149 J/m, to five digits; hip at lift-off, arms, hip at touch-down, arms, swing, times, step.
-CHEAPEST = (0.0019, 0.02108, 0.31, 0.09951, 0.09805, -0.01255, 0.0, 0.0)
-CHEAPEST += (0.04492, 0.0234, 0.30827, 0.09796, -0.05736, 0.02148, 0.0, 0.0, 0.015, 0.4, 0.56565, 0.07619)
 # Cheapest cycles at two speeds [m/s], in the same order without the step, which follows from speed and times.
 SLOW = (0.006195, 0.029353, 0.31, 0.015317, 0.046576, -0.009914, 0.0, 0.0)
 SLOW += (0.033941, 0.029151, 0.308712, 0.01054, -0.046196, 0.008558, 0.0, 0.0, 0.015, 0.4, 2.0)
@@ -32,12 +29,6 @@ CONTINUITY = 1e-8
 # Samples 1 ms apart and third derivatives of 1e3 rad/s^3: 1e-9 * 1e3 / 12, with a margin.
 THIRD_ORDER = 1e-6
 STEPS = 4
-
-
-@pytest.fixture(scope="module")
-def cycle() -> Result:
-    problem = nlp_gait.load("nao-cycle")
-    return Result(problem=problem, x=problem.check_x(CHEAPEST))
 
 
 @pytest.fixture(scope="module")
