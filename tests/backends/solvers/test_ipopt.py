@@ -183,7 +183,7 @@ def test_widths_of_ones_own_narrow_from_stage_to_stage() -> None:
 def test_the_usual_widths_end_at_the_gait_of_narrower_ones(margin_m: float, compiled: bool) -> None:
     problem = load("nao-ssp").with_values(dbm_x_mean_limit_m=margin_m)  # 0.065: samples stay at the edge of the jump
     usual, wide, narrow = (
-        solve(problem, starts=4, solver=IpoptSettings(widths=widths, compiled=compiled))
+        solve(problem, starts=2, solver=IpoptSettings(widths=widths, compiled=compiled))
         for widths in ((), (1e-2,), (1e-2, 5e-4, 2e-4, 1e-4, 5e-5))
     )
     assert {outcome.converged for outcome in usual.starts} == {True}
