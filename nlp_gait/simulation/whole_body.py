@@ -22,6 +22,7 @@ class Weights:
 
     mass: float = 10.0
     torso: float = 2.0
+    turn: float = 0.02  # of the torso about the vertical: it turns before a sole does, whose friction is small
     swing: float = 1.0
     swing_attitude: float = 0.3
     stance: float = 100.0
@@ -147,7 +148,7 @@ class WholeBodyQP:
             tasks[mass, count + WRENCH * i : count + WRENCH * i + 3] = axes / self._mass
         goals[mass], weights[mass] = targets.mass - self._gravity, w.mass
         tasks[torso, 3:6] = data.xmat[1].reshape(3, 3)  # rates of the root are in its own axes
-        goals[torso], weights[torso] = targets.torso, w.torso * self._height**2
+        goals[torso], weights[torso] = targets.torso, np.array([w.torso, w.torso, w.turn]) * self._height**2
         tasks[joints, 6:count] = np.eye(moving)
         goals[joints], weights[joints] = targets.joints[self._free_joints], w.joints * self._height**2
         tasks[loads, count:] = np.diag(np.tile(np.repeat([1.0, 2.0 / self._height], 3), 2)) / self._mass
