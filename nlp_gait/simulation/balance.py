@@ -12,7 +12,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.simulation.engine import Addresses, check_period, load_mujoco, measure_loads
 from nlp_gait.simulation.feedback import to_rotation_vector
-from nlp_gait.simulation.footholds import StepLimits, choose_step, clip_to_soles
+from nlp_gait.simulation.footholds import Step, StepLimits, choose_step, clip_to_soles
 from nlp_gait.simulation.plan import Plan
 from nlp_gait.simulation.walk_reference import SupportPhase, WalkReference
 from nlp_gait.simulation.whole_body import Targets, WholeBodyQP
@@ -33,6 +33,7 @@ class Balance:
     dcm_gain: float = 2.3  # of the ZMP by the error of the divergent component: 1 + k / w
     height_rate: float = 3.0  # natural frequencies [w], critically damped: of the height of the centre of mass,
     torso_rate: float = 4.0  # of the torso's attitude,
+    lift: float = 0.3  # most upward acceleration of the centre of mass [g]
     swing_rate: float = 7.0  # of the swinging foot,
     joint_rate: float = 6.0  # of the joints
     friction: float = 0.5  # coefficient that contact forces may use
@@ -44,6 +45,8 @@ class Balance:
     reach: float = 0.6  # farthest foothold from the standing foot, forward and sideways [h]
     gap: float = 0.1  # between soles that pass each other [widths of the sole]
     load_rate: float = 6.0  # of a foot's load after touch-down and before lift-off [weight w]
+    lost: float = 0.01  # distance of the divergent component outside the soles at which a robot at rest steps [h],
+    hopeless: float = 0.03  # unless no foothold reduces this error below this much [h]
     touch: float = 0.05  # load of a foot that has landed
     # Share of the planned angles that drives hold besides the torques of balance, for each m g h of the ankles' stiffness: a
     # stiff robot tips as a block; a compliant one would be turned over by its planned angles where a sole lies tilted
@@ -118,7 +121,7 @@ class StepClock:
     """Where a walk is: the plan's time and phase, the feet's offsets from the plan, and the foothold that is aimed at."""
 
     def __init__(self, settings: Balance, reference: WalkReference) -> None:
-        self._settings, self._reference = settings, reference
+        self._settings, self.reference = settings, reference
         self.time_s, self.rate = 0.0, 1.0  # of the plan, and seconds of it per second
         self.ended_s = 0.0  # since the end of the plan
         self._number, self.touched = 0, False
@@ -129,17 +132,17 @@ class StepClock:
     @property
     def phase(self) -> SupportPhase:
         """The present phase."""
-        return self._reference.phases[self._number]
+        return self.reference.phases[self._number]
 
     @property
     def before(self) -> SupportPhase | None:
         """The phase before it."""
-        return self._reference.phases[self._number - 1] if self._number else None
+        return self.reference.phases[self._number - 1] if self._number else None
 
     @property
     def after(self) -> SupportPhase | None:
         """The phase after it."""
-        later = self._reference.phases[self._number + 1 :]
+        later = self.reference.phases[self._number + 1 :]
         return later[0] if later else None
 
     @property
@@ -150,7 +153,7 @@ class StepClock:
 
     def advance(self, loads: Array, feet: Array) -> None:
         """Go on by one period: loads (2,) on the feet in weights, feet (2, 3) their places [m]."""
-        settings, reference, phase = self._settings, self._reference, self.phase
+        settings, reference, phase = self._settings, self.reference, self.phase
         time = self.time_s + self.rate * settings.period_s
         if phase.swing is None:
             if time >= phase.end_s and self.after is not None:
@@ -175,17 +178,25 @@ class StepClock:
             if stands:
                 self.offsets[i] = feet[i] - planned[i]
 
-    def aim(self, error: Array) -> None:
-        """Choose foothold and time of the swing by the error (2,) of the divergent component from the standing foot [m]."""
-        s, reference, phase = self._settings, self._reference, self.phase
+    def choose(self, dcm: Array) -> tuple[Step, Array]:
+        """Return time, foothold and cost of the swing by the divergent component (2,), and the turn (2, 2) into the sole's axes."""
+        s, reference, phase = self._settings, self.reference, self.phase
         assert phase.swing is not None
-        height, rate, stance = reference.height, reference.rate, 1 - phase.swing
-        left, total = phase.end_s - self.time_s, phase.end_s - phase.start_s
+        stance, left, total = 1 - phase.swing, phase.end_s - self.time_s, phase.end_s - phase.start_s
         yaw = float(reference.sample("yaw", self.time_s)[stance])
         to_sole = np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]])
         limits = self._find_limits(phase.swing, min(self.time_s + left / 2, phase.end_s), to_sole)
-        fastest = left / total * min(s.fastest / rate, total)
-        time, shift = choose_step(to_sole @ error, left, fastest, s.slowest * left, limits, s.hurry * height)
+        fastest = left / total * min(s.fastest / reference.rate, total)
+        error = to_sole @ (dcm - reference.sample("dcm", self.time_s) - self.offsets[stance, :2])
+        return choose_step(error, left, fastest, s.slowest * left, limits, s.hurry * reference.height), to_sole
+
+    def aim(self, dcm: Array) -> None:
+        """Choose foothold and time of the swing by the divergent component (2,) [m]."""
+        s, reference, phase = self._settings, self.reference, self.phase
+        assert phase.swing is not None
+        height, rate, stance = reference.height, reference.rate, 1 - phase.swing
+        left = phase.end_s - self.time_s
+        (time, shift, _), to_sole = self.choose(dcm)
         self.rate += CLOCK_FILTER * (float(np.clip(left / max(time, 1e-3), SLOWEST_CLOCK, FASTEST_CLOCK)) - self.rate)
         if left / self.rate > 0.1 / rate:
             step = GOAL_SPEED * height * rate * s.period_s
@@ -193,7 +204,7 @@ class StepClock:
 
     def _find_limits(self, swing: int, time_s: float, to_sole: Array) -> StepLimits:
         """Return the limits of a step in the axes of the standing sole; the ankles' range is that at a time of the plan."""
-        s, reference, stance, end = self._settings, self._reference, 1 - swing, self.phase.end_s
+        s, reference, stance, end = self._settings, self.reference, 1 - swing, self.phase.end_s
         feet = reference.sample("feet", time_s).reshape(2, 3)
         zmp = to_sole @ (reference.sample("zmp", time_s) - feet[stance, :2])
         front, back, left, right = s.edge * reference.zmp_reach[stance]
@@ -217,7 +228,7 @@ class StepClock:
 
     def compute_offsets(self) -> tuple[Array, Array]:
         """Return the offsets (2,) of the divergent component and of the ZMP from the plan [m], by those of the feet."""
-        reference, phase = self._reference, self.phase
+        reference, phase = self.reference, self.phase
         if phase.swing is not None:
             stance = self.offsets[1 - phase.swing, :2]
             carry = float(reference.sample("carry", phase.end_s)[0])
@@ -229,9 +240,21 @@ class StepClock:
         dcm = (1.0 - carry) * self.offsets[1 - landed] + carry * self.offsets[landed]
         return dcm[:2], (load * self.offsets[0] + (1.0 - load) * self.offsets[1])[:2]
 
+    def begin_step(self, reference: WalkReference, feet: Array) -> "StepClock":
+        """Return the clock of a step from rest with the feet (2, 3) where they are."""
+        clock = StepClock(self._settings, reference)
+        clock.offsets = feet - reference.sample("feet", 0.0).reshape(2, 3)
+        return clock
+
+    def predict(self, dcm: Array) -> Array:
+        """Return the part (2,) of an error of the divergent component (2,) that the next swing cannot remove."""
+        swing = copy.copy(self)
+        swing._number, swing.time_s = 1, self.phase.end_s
+        return swing.choose(dcm + swing.reference.sample("dcm", swing.time_s) - swing.reference.sample("dcm", 0.0))[0].left
+
     def find_most_load(self, foot: int) -> float:
         """Return the largest load of a foot [weight]: it rises after touch-down and falls before lift-off."""
-        phase, slope = self.phase, self._settings.load_rate * self._reference.rate
+        phase, slope = self.phase, self._settings.load_rate * self.reference.rate
         if phase.swing is not None:
             return EARLY_LOAD if phase.swing == foot else MOST_LOAD
         most = MOST_LOAD
@@ -256,13 +279,14 @@ class WholeBodyBalance:
         self._model.opt.disableflags |= int(self._engine.mjtDisableBit.mjDSBL_CONTACT)
         self._data = self._engine.MjData(self._model)
         self._addresses = Addresses(self._model, plan)
-        self._reference = WalkReference(plan, self._model, torque_limits)
-        self._qp = WholeBodyQP(self._reference, self._model, self._addresses, torque_limits, settings.friction)
+        reference = WalkReference(plan, self._model, torque_limits)
+        self._steps_from_rest = reference.step_from_rest(0), reference.step_from_rest(1)
+        self._qp = WholeBodyQP(reference, self._model, self._addresses, torque_limits, settings.friction)
         ankles = [plan.joints.index(plan.robot.path_to_root(foot.link)[0].name) for foot in plan.robot.feet.values()]
         stiffest = float(self._stiffness[ankles].max())
-        self._hold = min(1.0, settings.hold * stiffest / (self._reference.mass * plan.gravity * self._reference.height))
+        self._hold = min(1.0, settings.hold * stiffest / (reference.mass * plan.gravity * reference.height))
         self._sensor = StateSensor(settings, plan, self._model)
-        self.clock = StepClock(settings, self._reference)
+        self.clock, self._plan_s = StepClock(settings, reference), reference.duration_s
         self._command: Array | None = None
 
     def fork(self) -> Self:
@@ -276,7 +300,8 @@ class WholeBodyBalance:
 
     def find_plan_time(self, time_s: float) -> float:
         """Return the time of the plan that the robot has reached, and the time since the plan's end [s]."""
-        return self.clock.time_s + self.clock.ended_s
+        walked = self._plan_s if self.clock.reference in self._steps_from_rest else self.clock.time_s
+        return walked + self.clock.ended_s
 
     def correct(self, command: Array, data: Any) -> Array:
         """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
@@ -293,20 +318,36 @@ class WholeBodyBalance:
         engine.mj_fwdVelocity(self._model, data)
         engine.mj_subtreeVel(self._model, data)
         feet = data.site_xpos[joints.soles].copy()
-        weight = self._reference.mass * -float(self._model.opt.gravity[2])
+        weight = self.clock.reference.mass * -float(self._model.opt.gravity[2])
         self.clock.advance(state.loads / weight, feet)
+        if self.clock.after is None and self.clock.phase.swing is None:
+            self._step_if_lost(data, feet)
         solution = self._qp.solve(data, self._collect_targets(data, feet, weight))
         q, qd = data.qpos[joints.angles], data.qvel[joints.rates]
         if solution is None:
             return q.copy() if self._command is None else self._command
         soon = qd + solution.accelerations * s.period_s
-        planned, rate = (self._reference.sample(name, self.clock.time_s) for name in ("q", "qd"))
-        held, held_rate = q + self._hold * (planned - q), soon + self._hold * (self.clock.rate * rate - soon)
+        planned, rate = (self.clock.reference.sample(name, self.clock.time_s) for name in ("q", "qd"))
+        hold = 0.0 if self.clock.reference in self._steps_from_rest else self._hold
+        held, held_rate = q + hold * (planned - q), soon + hold * (self.clock.rate * rate - soon)
         return np.asarray(held + (solution.torques + self._damping * held_rate) / self._stiffness)
+
+    def _step_if_lost(self, data: Any, feet: Array) -> None:
+        """Begin a step from rest if the divergent component is so far outside the soles that no ZMP brings it back."""
+        reference = self.clock.reference
+        dcm = data.subtree_com[0, :2] + data.subtree_linvel[0, :2] / reference.rate
+        yaws = reference.sample("yaw", self.clock.time_s)
+        outside = dcm - clip_to_soles(dcm, feet[:, :2], yaws, reference.soles)
+        if np.linalg.norm(outside) > self._settings.lost * reference.height:
+            clocks = [self.clock.begin_step(step, feet) for step in self._steps_from_rest]
+            left = [np.linalg.norm(clock.predict(dcm)) for clock in clocks]
+            if min(left) < self._settings.hopeless * reference.height:
+                self.clock = clocks[int(np.argmin(left))]
 
     def _collect_targets(self, data: Any, feet: Array, weight: float) -> Targets:
         """Return the accelerations and loads that lead back to the plan."""
-        s, reference, clock = self._settings, self._reference, self.clock
+        s, clock = self._settings, self.clock
+        reference = clock.reference
         rate = reference.rate
 
         def sample(name: str) -> Array:
@@ -315,7 +356,7 @@ class WholeBodyBalance:
         com, velocity = data.subtree_com[0], data.subtree_linvel[0]
         dcm = com[:2] + velocity[:2] / rate
         if clock.phase.swing is not None:
-            clock.aim(dcm - sample("dcm") - clock.offsets[1 - clock.phase.swing, :2])
+            clock.aim(dcm)
         dcm_offset, zmp_offset = clock.compute_offsets()
         planned_zmp = sample("zmp") + zmp_offset
         standing = [i for i, stands in enumerate(clock.stands) if stands]
@@ -328,7 +369,7 @@ class WholeBodyBalance:
         mass[2] = _track(
             s.height_rate * rate, height - com[2], sample("com_rate")[2] - velocity[2], sample("com_acceleration")[2]
         )
-        mass[2] = np.clip(mass[2], -0.6 * reference.plan.gravity, 0.8 * reference.plan.gravity)
+        mass[2] = np.clip(mass[2], -0.6 * reference.plan.gravity, s.lift * reference.plan.gravity)
         joints = self._addresses
         q_error, qd_error = sample("q") - data.qpos[joints.angles], clock.rate * sample("qd") - data.qvel[joints.rates]
         load = float(sample("load_left")[0])
@@ -351,16 +392,17 @@ class WholeBodyBalance:
         time, ahead, engine = self.clock.time_s, 0.01, self._engine
         rotation, matrices = data.xmat[self._addresses.torso].reshape(3, 3), np.zeros((2, 9))
         for matrix, at_time in zip(matrices, (time, time + ahead), strict=True):
-            quaternion = self._reference.sample("attitude", at_time)
+            quaternion = self.clock.reference.sample("attitude", at_time)
             engine.mju_quat2Mat(matrix, quaternion / np.linalg.norm(quaternion))
         planned, soon = matrices.reshape(2, 3, 3)
         rate = to_rotation_vector(soon @ planned.T) / ahead * self.clock.rate
         error = to_rotation_vector(planned @ rotation.T)
-        return _track(self._settings.torso_rate * self._reference.rate, error, rate - rotation @ data.qvel[3:6])
+        return _track(self._settings.torso_rate * self.clock.reference.rate, error, rate - rotation @ data.qvel[3:6])
 
     def _move_foot(self, foot: int, data: Any, feet: Array) -> Array:
         """Return the acceleration (6,) of a sole: none if it stands, else along the planned path to the new foothold."""
-        s, reference, clock = self._settings, self._reference, self.clock
+        s, clock = self._settings, self.clock
+        reference = clock.reference
         rate, velocity = s.swing_rate * reference.rate, np.zeros(6)
         kind = self._engine.mjtObj.mjOBJ_SITE
         self._engine.mj_objectVelocity(self._model, data, kind, self._addresses.soles[foot], velocity, 0)

@@ -1,6 +1,7 @@
 """Footholds and times of steps that bring the divergent component of motion back to the plan, in closed form."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,14 @@ class StepLimits:
     shift_high: Array  #: (2,) largest [m]
 
 
+class Step(NamedTuple):
+    """A choice of foothold and time."""
+
+    time_s: float  # to touch-down
+    shift: Array  # (2,) of the foothold [m]
+    left: Array  # (2,) present error of the divergent component that it does not remove [m]
+
+
 def find_shift(error: Array, time_s: float, limits: StepLimits) -> Array:
     """Return the least change (2,) of the foothold [m] after which an error (2,) of the divergent component is gone.
 
@@ -39,13 +48,13 @@ def find_shift(error: Array, time_s: float, limits: StepLimits) -> Array:
 
 def choose_step(
     error: Array, time_s: float, fastest_s: float, slowest_s: float, limits: StepLimits, price_m: float
-) -> tuple[float, Array]:
-    """Return the time to touch-down [s] and the change of the foothold (2,) [m] of least cost.
+) -> Step:
+    """Return the time to touch-down and the change of the foothold of least cost.
 
     The cost is the squared change, ``OUT_OF_REACH`` times the squared error (now) that its limits leave, and the squared change
     of the time, of which a whole 1 / rate costs ``price_m`` [m].
     """
-    best_cost, best = np.inf, (time_s, np.zeros(2))
+    best_cost, best = np.inf, Step(time_s, np.zeros(2), error)
     for candidate in (time_s, *np.linspace(fastest_s, max(slowest_s, fastest_s), CANDIDATES - 1).tolist()):
         wanted = find_shift(error, candidate, limits)
         shift = np.clip(wanted, limits.shift_low, limits.shift_high)
@@ -53,7 +62,7 @@ def choose_step(
         hurry = price_m * limits.rate * (candidate - time_s)
         cost = OUT_OF_REACH * left @ left + shift @ shift + hurry**2
         if cost < best_cost:
-            best_cost, best = cost, (candidate, shift)
+            best_cost, best = cost, Step(candidate, shift, left)
     return best
 
 

@@ -1,7 +1,9 @@
 """A planned walk as balance feedback follows it: phases, divergent component of motion, loads, on one even grid of times."""
 
+import copy
+import itertools
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -12,6 +14,10 @@ from nlp_gait.simulation.plan import SIDES, Plan
 
 STEP_S = 0.002  # of the grid
 SMOOTHING = 11  # samples over which the accelerations of the centre of mass are averaged
+
+# Of steps from rest: times of the first double support, a swing, and the double supports after the swings [1 / w], and height
+# of the swinging foot [h].
+PUSH_OFF, SWING, SUPPORT, LAST_SUPPORT, LIFT, DOWN = 0.4, 1.4, 0.5, 2.0, 0.06, 0.9
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +76,47 @@ class WalkReference:
             "yaw_rate": np.gradient(np.unwrap(yaw, axis=0), STEP_S, axis=0),
             "attitude": plan.attitude(times),
         }
+        self._store(arrays)
+
+    def _store(self, arrays: dict[str, Array]) -> None:
         self._rows, self._columns, end = np.hstack(list(arrays.values())), dict[str, slice](), 0
         for name, array in arrays.items():
             self._columns[name] = slice(end, end + array.shape[1])
             end += array.shape[1]
         self._last: tuple[float, Array] = (-1.0, self._rows[0])
+
+    def step_from_rest(self, first: int) -> Self:
+        """Return a reference that begins and ends where this one ends: a step of one foot in its place, then of the other.
+
+        The centre of mass moves as a pendulum whose ZMP is under the standing ankle, and between the feet in double support.
+        """
+        other = copy.copy(self)
+        spans = np.array([PUSH_OFF, SWING, SUPPORT, SWING, LAST_SUPPORT]) / self.rate
+        ends = np.round(np.cumsum(spans) / STEP_S) * STEP_S
+        swings = (None, first, None, 1 - first, None)
+        other.phases = [SupportPhase(*t, swing) for t, swing in zip(itertools.pairwise([0.0, *ends]), swings, strict=True)]
+        other.duration_s = float(ends[-1])
+        times = np.arange(round(ends[-1] / STEP_S) + 2) * STEP_S
+        arrays = {name: np.tile(self._rows[-1, columns], (len(times), 1)) for name, columns in self._columns.items()}
+        for name in ("qd", "com_rate", "com_acceleration", "lever", "feet_rate", "yaw_rate"):
+            arrays[name][:] = 0.0
+        rest, on_left = arrays["load_left"][-1, 0], float(first == 1)
+        knots = np.sort([0.0, *ends, ends[0] + STEP_S])
+        load = np.interp(times, knots, [1.0 - on_left, 1.0 - on_left, on_left, on_left, 1.0 - on_left, 1.0 - on_left, rest])
+        feet = arrays["feet"].reshape(-1, 2, 3)
+        zmp = arrays["zmp"] + (load - rest)[:, None] * (feet[:, 0, :2] - feet[:, 1, :2])
+        dcm, decay = arrays["zmp"].copy(), np.exp(-self.rate * STEP_S)
+        for k in range(len(times) - 2, -1, -1):
+            dcm[k] = zmp[k] + (dcm[k + 1] - zmp[k]) * decay
+        for phase in other.phases:
+            if phase.swing is not None:
+                done = np.clip((times - phase.start_s) / (DOWN * (phase.end_s - phase.start_s)), 0.0, 1.0)
+                feet[:, phase.swing, 2] += LIFT * self.height * np.sin(np.pi * done) ** 2
+        arrays["feet_rate"] = np.gradient(arrays["feet"], STEP_S, axis=0)
+        arrays |= {"zmp": zmp, "dcm": dcm, "load_left": load[:, None]}
+        arrays["carry"] = _integrate_carry(other.phases, load, self.rate)[:, None]
+        other._store(arrays)
+        return other
 
     def sample(self, name: str, time_s: float) -> Array:
         """Return a quantity at a time of the plan."""

@@ -1,5 +1,6 @@
 """Whole-body control: joint torques whose accelerations and contact forces are nearest to what balance asks for."""
 
+import itertools
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -20,7 +21,8 @@ WRENCH = 6  # force and moment on a sole, in its axes
 class Weights:
     """Weights of squared accelerations, angular ones times the height of the centre of mass."""
 
-    mass: float = 10.0
+    mass: float = 10.0  # horizontally
+    height: float = 10.0
     torso: float = 2.0
     turn: float = 0.02  # of the torso about the vertical: it turns before a sole does, whose friction is small
     swing: float = 1.0
@@ -146,7 +148,7 @@ class WholeBodyQP:
         for i in (0, 1):  # contact forces alone move the mass
             axes = data.site_xmat[self._soles[i]].reshape(3, 3)
             tasks[mass, count + WRENCH * i : count + WRENCH * i + 3] = axes / self._mass
-        goals[mass], weights[mass] = targets.mass - self._gravity, w.mass
+        goals[mass], weights[mass] = targets.mass - self._gravity, (w.mass, w.mass, w.height)
         tasks[torso, 3:6] = data.xmat[1].reshape(3, 3)  # rates of the root are in its own axes
         goals[torso], weights[torso] = targets.torso, np.array([w.torso, w.torso, w.turn]) * self._height**2
         tasks[joints, 6:count] = np.eye(moving)
@@ -169,20 +171,22 @@ class WholeBodyQP:
 
 
 def _make_cone(soles: Array, friction: float) -> Array:
-    """Return rows (20, 12) that are >= 0 for wrenches within friction pyramids and with pressure within the soles."""
-    rows = []
-    for i, (front, back, left, right) in enumerate(0.95 * soles):
-        side, turn = friction / np.sqrt(2.0), friction * 0.4 * (front + back)
-        for column, sign, arm in (
-            *((0, sign, side) for sign in (1.0, -1.0)),
-            *((1, sign, side) for sign in (1.0, -1.0)),
-            *((5, sign, turn) for sign in (1.0, -1.0)),
-            (4, 1.0, front),
-            (4, -1.0, back),
-            (3, -1.0, left),
-            (3, 1.0, right),
-        ):
-            row = np.zeros(12)
-            row[WRENCH * i + 2], row[WRENCH * i + column] = arm, sign
-            rows.append(row)
-    return np.array(rows)
+    """Return rows (2 R, 12) that are >= 0 for wrenches of forces at the corners of the soles, each in a friction pyramid.
+
+    Source:
+        Caron, Pham, Nakamura (2015), eqs. 22 to 27: a sole bears less moment about its normal, the nearer to an edge its pressure.
+    """
+    mu, cones = friction / np.sqrt(2.0), []
+    for front, back, left, right in 0.95 * soles:
+        x, y = (front + back) / 2, (left + right) / 2
+        fx, fy, fz, roll, pitch, yaw = np.eye(WRENCH)
+        ahead, aside = (front - back) / 2, (left - right) / 2
+        roll, pitch, yaw = roll - aside * fz, pitch + ahead * fz, yaw - ahead * fy + aside * fx
+        rows = [share * fz + sign * part for part, share in ((fx, mu), (fy, mu), (roll, y), (pitch, x)) for sign in (1, -1)]
+        for turn in (1, -1):
+            for sides in itertools.product((1, -1), repeat=2):
+                edges = sides[0] * (y * fx + turn * mu * roll) + sides[1] * (x * fy + turn * mu * pitch)
+                rows.append(mu * (x + y) * fz - turn * yaw + edges)
+        cones.append(rows)
+    left_cone, right_cone = np.array(cones)
+    return np.block([[left_cone, np.zeros_like(right_cone)], [np.zeros_like(left_cone), right_cone]])
