@@ -31,6 +31,7 @@ INSTANTS = 12  # of pushes, even over the inner steps
 LEVELS, LARGEST = 16, 0.5  # of the bisection, and its largest impulse [m sqrt(g h)]
 PUSH_S = 0.1
 SETTLE = 10.0  # [1 / w] after a push, within which a robot that has lost its balance falls
+RECOVER, RESOLUTION = 25.0, 0.05  # the same at rest, where it may step and step back, and steps of the impulse [m w d]
 SEEDS = range(12)
 WORLDS = {  # by name: conditions by seed, and whether sensors have noise and a delay of 4 ms
     "bumps of 5 mm": (lambda seed: Conditions(bumps=Bumps(height_m=0.005, seed=seed)), False),
@@ -127,7 +128,7 @@ def describe_walks(plan: Plan, walks: list[tuple[Conditions, Drive]]) -> str:
 
 
 def tabulate_rest(paths: list[str]) -> Iterator[str]:
-    """Least impulse at rest that makes a robot fall, over that of a pendulum whose ZMP is at the edge of its soles."""
+    """Least impulse at rest that fells a robot, over that of a pendulum whose ZMP is at the edge of its soles, in steps."""
     yield header("robot", "feedback", *DIRECTIONS, "ms per measurement")
     for path in paths:
         name, plan, height, unit = load(path)
@@ -135,7 +136,7 @@ def tabulate_rest(paths: list[str]) -> Iterator[str]:
         step_ms = dict.fromkeys(("none", "balance"), 0.0)
         for feedback in step_ms:
             drive = choose_feedback(Drive(), feedback)
-            run, begin = Run(plan, drive=drive, settle_s=SETTLE / pendulum + 3.0), process_time()
+            run, begin = Run(plan, drive=drive, settle_s=RECOVER / pendulum + 3.0), process_time()
             run.advance(plan.duration_s + 2.0)
             step_ms[feedback] = 1e3 * (process_time() - begin) * TIME_STEP / run.time_s
             tick = ""
@@ -145,7 +146,14 @@ def tabulate_rest(paths: list[str]) -> Iterator[str]:
                 yield cells(name, feedback, f"falls at {run.fell_at_s:.1f} s", "", "", "", tick)
                 continue
             bounds = find_bounds(plan, run, pendulum)
-            shares = (bisect([run], way, unit, SETTLE / pendulum)[1] / bounds[way] for way in DIRECTIONS)
+            shares = (
+                next(
+                    share
+                    for share in np.arange(0.5, 3.0, RESOLUTION)
+                    if falls(run, (x * share * bounds[way], y * share * bounds[way]), RECOVER / pendulum)
+                )
+                for way, (x, y) in DIRECTIONS.items()
+            )
             yield cells(name, feedback, *(f"{share:.2f}" for share in shares), tick)
 
 

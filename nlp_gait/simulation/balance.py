@@ -45,8 +45,8 @@ class Balance:
     reach: float = 0.6  # farthest foothold from the standing foot, forward and sideways [h]
     gap: float = 0.1  # between soles that pass each other [widths of the sole]
     load_rate: float = 6.0  # of a foot's load after touch-down and before lift-off [weight w]
-    lost: float = 0.01  # distance of the divergent component outside the soles at which a robot at rest steps [h],
-    hopeless: float = 0.03  # unless no foothold reduces this error below this much [h]
+    lost: float = 0.01  # distance of the divergent component outside the soles at which a robot at rest steps [h]
+    hopeless: float = 0.03  # error that no foothold may leave for such a step [h]
     touch: float = 0.05  # load of a foot that has landed
     # Share of the planned angles that drives hold besides the torques of balance, for each m g h of the ankles' stiffness: a
     # stiff robot tips as a block; a compliant one would be turned over by its planned angles where a sole lies tilted
@@ -120,12 +120,14 @@ class StateSensor:
 class StepClock:
     """Where a walk is: the plan's time and phase, the feet's offsets from the plan, and the foothold that is aimed at."""
 
-    def __init__(self, settings: Balance, reference: WalkReference) -> None:
+    def __init__(self, settings: Balance, reference: WalkReference, feet: Array | None = None) -> None:
+        """Begin with the feet (2, 3) where they are planned, or at these places [m]."""
         self._settings, self.reference = settings, reference
         self.time_s, self.rate = 0.0, 1.0  # of the plan, and seconds of it per second
         self.ended_s = 0.0  # since the end of the plan
         self._number, self.touched = 0, False
-        self.offsets = np.zeros((2, 3))  # of the feet from their planned places [m]
+        planned = reference.sample("feet", 0.0).reshape(2, 3)
+        self.offsets = np.zeros((2, 3)) if feet is None else feet - planned  # of the feet from their planned places [m]
         self.goal, self.origin = np.zeros(2), np.zeros(2)  # of the swinging foot's offset, and where it began
         self.lowered_m = 0.0  # by a foot that searches the ground
 
@@ -179,7 +181,7 @@ class StepClock:
                 self.offsets[i] = feet[i] - planned[i]
 
     def choose(self, dcm: Array) -> tuple[Step, Array]:
-        """Return time, foothold and cost of the swing by the divergent component (2,), and the turn (2, 2) into the sole's axes."""
+        """Return the step by the divergent component (2,) [m], and the rotation (2, 2) into the axes of the standing sole."""
         s, reference, phase = self._settings, self.reference, self.phase
         assert phase.swing is not None
         stance, left, total = 1 - phase.swing, phase.end_s - self.time_s, phase.end_s - phase.start_s
@@ -192,14 +194,13 @@ class StepClock:
 
     def aim(self, dcm: Array) -> None:
         """Choose foothold and time of the swing by the divergent component (2,) [m]."""
-        s, reference, phase = self._settings, self.reference, self.phase
+        reference, phase = self.reference, self.phase
         assert phase.swing is not None
-        height, rate, stance = reference.height, reference.rate, 1 - phase.swing
-        left = phase.end_s - self.time_s
+        stance, left = 1 - phase.swing, phase.end_s - self.time_s
         (time, shift, _), to_sole = self.choose(dcm)
         self.rate += CLOCK_FILTER * (float(np.clip(left / max(time, 1e-3), SLOWEST_CLOCK, FASTEST_CLOCK)) - self.rate)
-        if left / self.rate > 0.1 / rate:
-            step = GOAL_SPEED * height * rate * s.period_s
+        if left / self.rate > 0.1 / reference.rate:
+            step = GOAL_SPEED * reference.height * reference.rate * self._settings.period_s
             self.goal += np.clip(self.offsets[stance, :2] + to_sole.T @ shift - self.goal, -step, step)
 
     def _find_limits(self, swing: int, time_s: float, to_sole: Array) -> StepLimits:
@@ -240,17 +241,12 @@ class StepClock:
         dcm = (1.0 - carry) * self.offsets[1 - landed] + carry * self.offsets[landed]
         return dcm[:2], (load * self.offsets[0] + (1.0 - load) * self.offsets[1])[:2]
 
-    def begin_step(self, reference: WalkReference, feet: Array) -> "StepClock":
-        """Return the clock of a step from rest with the feet (2, 3) where they are."""
-        clock = StepClock(self._settings, reference)
-        clock.offsets = feet - reference.sample("feet", 0.0).reshape(2, 3)
-        return clock
-
-    def predict(self, dcm: Array) -> Array:
-        """Return the part (2,) of an error of the divergent component (2,) that the next swing cannot remove."""
-        swing = copy.copy(self)
-        swing._number, swing.time_s = 1, self.phase.end_s
-        return swing.choose(dcm + swing.reference.sample("dcm", swing.time_s) - swing.reference.sample("dcm", 0.0))[0].left
+    def predict_error(self, dcm: Array) -> float:
+        """Return the error [m] that the first swing leaves of a divergent component (2,), as if the swing began now."""
+        clock, reference = copy.copy(self), self.reference
+        clock._number, clock.time_s = 1, reference.phases[1].start_s
+        moved = reference.sample("dcm", clock.time_s) - reference.sample("dcm", 0.0)
+        return float(np.linalg.norm(clock.choose(dcm + moved)[0].left))
 
     def find_most_load(self, foot: int) -> float:
         """Return the largest load of a foot [weight]: it rises after touch-down and falls before lift-off."""
@@ -298,10 +294,14 @@ class WholeBodyBalance:
         clock.offsets, clock.goal, clock.origin = clock.offsets.copy(), clock.goal.copy(), clock.origin.copy()
         return other
 
+    @property
+    def _steps(self) -> bool:
+        """Whether the robot has left the plan by a step from rest."""
+        return self.clock.reference in self._steps_from_rest
+
     def find_plan_time(self, time_s: float) -> float:
         """Return the time of the plan that the robot has reached, and the time since the plan's end [s]."""
-        walked = self._plan_s if self.clock.reference in self._steps_from_rest else self.clock.time_s
-        return walked + self.clock.ended_s
+        return (self._plan_s if self._steps else self.clock.time_s) + self.clock.ended_s
 
     def correct(self, command: Array, data: Any) -> Array:
         """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
@@ -328,21 +328,20 @@ class WholeBodyBalance:
             return q.copy() if self._command is None else self._command
         soon = qd + solution.accelerations * s.period_s
         planned, rate = (self.clock.reference.sample(name, self.clock.time_s) for name in ("q", "qd"))
-        hold = 0.0 if self.clock.reference in self._steps_from_rest else self._hold
+        hold = 0.0 if self._steps else self._hold
         held, held_rate = q + hold * (planned - q), soon + hold * (self.clock.rate * rate - soon)
         return np.asarray(held + (solution.torques + self._damping * held_rate) / self._stiffness)
 
     def _step_if_lost(self, data: Any, feet: Array) -> None:
-        """Begin a step from rest if the divergent component is so far outside the soles that no ZMP brings it back."""
-        reference = self.clock.reference
+        """Begin a step from rest where the divergent component has left the soles (2, 3), and a foothold brings it back."""
+        s, reference = self._settings, self.clock.reference
         dcm = data.subtree_com[0, :2] + data.subtree_linvel[0, :2] / reference.rate
-        yaws = reference.sample("yaw", self.clock.time_s)
-        outside = dcm - clip_to_soles(dcm, feet[:, :2], yaws, reference.soles)
-        if np.linalg.norm(outside) > self._settings.lost * reference.height:
-            clocks = [self.clock.begin_step(step, feet) for step in self._steps_from_rest]
-            left = [np.linalg.norm(clock.predict(dcm)) for clock in clocks]
-            if min(left) < self._settings.hopeless * reference.height:
-                self.clock = clocks[int(np.argmin(left))]
+        nearest = clip_to_soles(dcm, feet[:, :2], reference.sample("yaw", self.clock.time_s), reference.soles)
+        if np.linalg.norm(dcm - nearest) > s.lost * reference.height:
+            clocks = [StepClock(s, steps, feet) for steps in self._steps_from_rest]
+            errors = [clock.predict_error(dcm) for clock in clocks]
+            if min(errors) < s.hopeless * reference.height:
+                self.clock = clocks[errors.index(min(errors))]
 
     def _collect_targets(self, data: Any, feet: Array, weight: float) -> Targets:
         """Return the accelerations and loads that lead back to the plan."""

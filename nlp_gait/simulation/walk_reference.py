@@ -15,9 +15,10 @@ from nlp_gait.simulation.plan import SIDES, Plan
 STEP_S = 0.002  # of the grid
 SMOOTHING = 11  # samples over which the accelerations of the centre of mass are averaged
 
-# Of steps from rest: times of the first double support, a swing, and the double supports after the swings [1 / w], and height
-# of the swinging foot [h].
-PUSH_OFF, SWING, SUPPORT, LAST_SUPPORT, LIFT, DOWN = 0.4, 1.4, 0.5, 2.0, 0.06, 0.9
+# Steps from rest: times of the first double support, a swing, and the double supports after swings [1 / w], height of the
+# swinging foot [h], and share of the swing after which it is down.
+PUSH_OFF, SWING, SUPPORT, LAST_SUPPORT = 0.4, 1.4, 0.5, 2.0
+LIFT, DOWN = 0.06, 0.9
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,32 +87,32 @@ class WalkReference:
         self._last: tuple[float, Array] = (-1.0, self._rows[0])
 
     def step_from_rest(self, first: int) -> Self:
-        """Return a reference that begins and ends where this one ends: a step of one foot in its place, then of the other.
+        """Return a reference that begins and ends at the end of this one: a step in place of one foot, then of the other.
 
-        The centre of mass moves as a pendulum whose ZMP is under the standing ankle, and between the feet in double support.
+        The centre of mass moves as a pendulum at constant height. Its ZMP is under the foot that will swing first, which pushes
+        it to the other one, then under the standing foot, and at last where it was.
         """
-        other = copy.copy(self)
-        spans = np.array([PUSH_OFF, SWING, SUPPORT, SWING, LAST_SUPPORT]) / self.rate
-        ends = np.round(np.cumsum(spans) / STEP_S) * STEP_S
-        swings = (None, first, None, 1 - first, None)
-        other.phases = [SupportPhase(*t, swing) for t, swing in zip(itertools.pairwise([0.0, *ends]), swings, strict=True)]
+        other, swings = copy.copy(self), (None, first, None, 1 - first, None)
+        ends = np.round(np.cumsum([PUSH_OFF, SWING, SUPPORT, SWING, LAST_SUPPORT]) / self.rate / STEP_S) * STEP_S
+        other.phases = [
+            SupportPhase(*times, swing) for times, swing in zip(itertools.pairwise([0.0, *ends]), swings, strict=True)
+        ]
         other.duration_s = float(ends[-1])
-        times = np.arange(round(ends[-1] / STEP_S) + 2) * STEP_S
+        times = np.arange(round(other.duration_s / STEP_S) + 2) * STEP_S
         arrays = {name: np.tile(self._rows[-1, columns], (len(times), 1)) for name, columns in self._columns.items()}
-        for name in ("qd", "com_rate", "com_acceleration", "lever", "feet_rate", "yaw_rate"):
+        for name in ("qd", "com_rate", "com_acceleration", "lever", "yaw_rate"):
             arrays[name][:] = 0.0
-        rest, on_left = arrays["load_left"][-1, 0], float(first == 1)
-        knots = np.sort([0.0, *ends, ends[0] + STEP_S])
-        load = np.interp(times, knots, [1.0 - on_left, 1.0 - on_left, on_left, on_left, 1.0 - on_left, 1.0 - on_left, rest])
+        rest, left = arrays["load_left"][-1, 0], float(first == 0)
+        knots = [0.0, ends[0], ends[0] + STEP_S, *ends[1:]]
+        load = np.interp(times, knots, [left, left, 1.0 - left, 1.0 - left, left, left, rest])
         feet = arrays["feet"].reshape(-1, 2, 3)
         zmp = arrays["zmp"] + (load - rest)[:, None] * (feet[:, 0, :2] - feet[:, 1, :2])
         dcm, decay = arrays["zmp"].copy(), np.exp(-self.rate * STEP_S)
         for k in range(len(times) - 2, -1, -1):
             dcm[k] = zmp[k] + (dcm[k + 1] - zmp[k]) * decay
-        for phase in other.phases:
-            if phase.swing is not None:
-                done = np.clip((times - phase.start_s) / (DOWN * (phase.end_s - phase.start_s)), 0.0, 1.0)
-                feet[:, phase.swing, 2] += LIFT * self.height * np.sin(np.pi * done) ** 2
+        for phase in (other.phases[1], other.phases[3]):
+            done = np.clip((times - phase.start_s) / (DOWN * (phase.end_s - phase.start_s)), 0.0, 1.0)
+            feet[:, phase.swing, 2] += LIFT * self.height * np.sin(np.pi * done) ** 2
         arrays["feet_rate"] = np.gradient(arrays["feet"], STEP_S, axis=0)
         arrays |= {"zmp": zmp, "dcm": dcm, "load_left": load[:, None]}
         arrays["carry"] = _integrate_carry(other.phases, load, self.rate)[:, None]

@@ -21,7 +21,7 @@ WRENCH = 6  # force and moment on a sole, in its axes
 class Weights:
     """Weights of squared accelerations, angular ones times the height of the centre of mass."""
 
-    mass: float = 10.0  # horizontally
+    mass: float = 40.0  # horizontally
     height: float = 10.0
     torso: float = 2.0
     turn: float = 0.02  # of the torso about the vertical: it turns before a sole does, whose friction is small
@@ -57,8 +57,8 @@ class WholeBodyQP:
     """Quadratic program of one robot in accelerations and contact wrenches; torque limits are hard.
 
     Minimises the weighted squares of the errors of mass, torso, feet, joints and loads subject to the equations of motion of the
-    root, friction pyramids, centres of pressure within the soles, load limits, and torque limits. Joints that the plan never
-    moves follow their own target and are no variables.
+    root, friction at the corners of the soles, load limits, and torque limits. Joints that the plan never moves follow their own
+    target and are no variables.
 
     Source:
         Kuindersma et al. (2016); solved by DAQP, Arnstroem, Bemporad, Axehill (2022).
@@ -171,22 +171,26 @@ class WholeBodyQP:
 
 
 def _make_cone(soles: Array, friction: float) -> Array:
-    """Return rows (2 R, 12) that are >= 0 for wrenches of forces at the corners of the soles, each in a friction pyramid.
+    """Return rows (32, 12) that are >= 0 for wrenches of forces at the corners of the soles, each within a friction pyramid.
+
+    A sole bears less moment about its normal, the nearer its pressure is to an edge.
 
     Source:
-        Caron, Pham, Nakamura (2015), eqs. 22 to 27: a sole bears less moment about its normal, the nearer to an edge its pressure.
+        Caron, Pham, Nakamura (2015), the wrench cone of a rectangle.
     """
-    mu, cones = friction / np.sqrt(2.0), []
+    mu, cones = friction / np.sqrt(2.0), list[Array]()
     for front, back, left, right in 0.95 * soles:
-        x, y = (front + back) / 2, (left + right) / 2
+        x, y, ahead, aside = (front + back) / 2, (left + right) / 2, (front - back) / 2, (left - right) / 2
         fx, fy, fz, roll, pitch, yaw = np.eye(WRENCH)
-        ahead, aside = (front - back) / 2, (left - right) / 2
-        roll, pitch, yaw = roll - aside * fz, pitch + ahead * fz, yaw - ahead * fy + aside * fx
-        rows = [share * fz + sign * part for part, share in ((fx, mu), (fy, mu), (roll, y), (pitch, x)) for sign in (1, -1)]
-        for turn in (1, -1):
-            for sides in itertools.product((1, -1), repeat=2):
-                edges = sides[0] * (y * fx + turn * mu * roll) + sides[1] * (x * fy + turn * mu * pitch)
-                rows.append(mu * (x + y) * fz - turn * yaw + edges)
-        cones.append(rows)
-    left_cone, right_cone = np.array(cones)
-    return np.block([[left_cone, np.zeros_like(right_cone)], [np.zeros_like(left_cone), right_cone]])
+        roll, pitch, yaw = (
+            roll - aside * fz,
+            pitch + ahead * fz,
+            yaw - ahead * fy + aside * fx,
+        )  # about the sole's centre
+        rows = [arm * fz + sign * part for part, arm in ((fx, mu), (fy, mu), (roll, y), (pitch, x)) for sign in (1, -1)]
+        for turn, a, b in itertools.product((1, -1), repeat=3):
+            rows.append(
+                mu * (x + y) * fz - turn * yaw + a * (y * fx + turn * mu * roll) + b * (x * fy + turn * mu * pitch)
+            )
+        cones.append(np.array(rows))
+    return np.block([[cones[0], np.zeros_like(cones[0])], [np.zeros_like(cones[1]), cones[1]]])
