@@ -115,6 +115,11 @@ class Run:
         """Begin at the planned state, to end some time after the plan; raises MissingExtraError."""
         self._engine, self.plan = load_mujoco(), plan
         drive, self._conditions = drive or Drive(), conditions or Conditions()
+        push, end_s = self._conditions.push, plan.duration_s + settle_s
+        if push is not None and not 0.0 <= (push.start_s or 0.0) < end_s:
+            raise InputError(
+                f"a push must begin from 0 s to the end of the simulation, {end_s:.4g} s, got {push.start_s:g} s"
+            )
         self.model, self.data = prepare(plan, self._conditions, drive, sole)
         self._addresses = Addresses(self.model, plan)
         steps = round((plan.duration_s + settle_s) / TIME_STEP)

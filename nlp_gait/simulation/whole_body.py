@@ -82,7 +82,7 @@ class WholeBodyQP:
         self._held = self._rates[held]
         self._free = np.concatenate([np.arange(6), self._rates[~held]])
         self._free_joints = np.flatnonzero(~held)
-        self._cone = _make_cone(reference.soles, friction)
+        self.cone = _make_cone(reference.soles, friction)
         self.failures = 0
 
     def solve(self, data: Any, targets: Targets) -> Torques | None:
@@ -104,9 +104,9 @@ class WholeBodyQP:
         # Torques of all coordinates: motion @ x + rest; those of the root are zero.
         motion, bias = np.hstack([inertia[:, free], -contact]), data.qfrc_bias + inertia @ acceleration
         joints = self._rates
-        rows = np.vstack([motion[:6], motion[joints], np.hstack([np.zeros((len(self._cone), count)), self._cone])])
-        low = np.concatenate([-bias[:6], -self._limits - bias[joints], np.zeros(len(self._cone))])
-        high = np.concatenate([-bias[:6], self._limits - bias[joints], np.full(len(self._cone), UNBOUNDED)])
+        rows = np.vstack([motion[:6], motion[joints], np.hstack([np.zeros((len(self.cone), count)), self.cone])])
+        low = np.concatenate([-bias[:6], -self._limits - bias[joints], np.zeros(len(self.cone))])
+        high = np.concatenate([-bias[:6], self._limits - bias[joints], np.full(len(self.cone), UNBOUNDED)])
         least, most, kind = self._bound_wrenches(targets)
         low = np.concatenate([np.full(count, -UNBOUNDED), least, low])
         high = np.concatenate([np.full(count, UNBOUNDED), most, high])

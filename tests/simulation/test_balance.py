@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import linprog
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result
@@ -14,7 +15,7 @@ from nlp_gait.simulation.plan import Plan, make_plan
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("daqp")
 
-from nlp_gait.simulation.balance import Balance  # noqa: E402
+from nlp_gait.simulation.balance import Balance, WholeBodyBalance  # noqa: E402
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.engine import Addresses  # noqa: E402
 from nlp_gait.simulation.mjcf import Bumps  # noqa: E402
@@ -49,10 +50,10 @@ def test_a_shift_takes_what_the_ankles_leave_of_an_error(error: tuple[float, flo
 
 def test_a_step_is_hastened_where_its_foothold_is_out_of_reach_and_stays_where_nothing_is_wrong() -> None:
     assert choose_step(np.zeros(2), 0.4, 0.15, 0.52, LIMITS, 0.06)[0] == 0.4
-    time, shift = choose_step(np.array([0.06, 0.0]), 0.4, 0.15, 0.52, LIMITS, 0.06)
-    assert time < 0.4 and 0.0 < shift[0] < LIMITS.shift_high[0] and shift[1] == 0.0
-    time, shift = choose_step(np.array([0.15, -0.06]), 0.4, 0.15, 0.52, LIMITS, 0.06)
-    assert time == 0.15 and shift.tolist() == [LIMITS.shift_high[0], LIMITS.shift_low[1]]
+    time, shift, left = choose_step(np.array([0.06, 0.0]), 0.4, 0.15, 0.52, LIMITS, 0.06)
+    assert time < 0.4 and 0.0 < shift[0] < LIMITS.shift_high[0] and shift[1] == 0.0 and (left == 0.0).all()
+    time, shift, left = choose_step(np.array([0.15, -0.06]), 0.4, 0.15, 0.52, LIMITS, 0.06)
+    assert time == 0.15 and shift.tolist() == [LIMITS.shift_high[0], LIMITS.shift_low[1]] and left[0] > 0.0 > left[1]
 
 
 def test_the_nearest_point_of_turned_soles_is_that_of_a_fine_grid() -> None:
@@ -101,13 +102,90 @@ def test_torques_and_wrenches_give_the_accelerations_in_the_engine(plan: Plan) -
     assert forces.sum() == pytest.approx(weight * (1.0 + 0.3 / plan.gravity), rel=0.05) and (forces > 0.0).all()
 
 
+@pytest.mark.slow
+def test_a_wrench_is_allowed_just_where_forces_at_the_corners_of_a_sole_give_it(plan: Plan) -> None:
+    model, _ = prepare(plan, Conditions(), Drive(), "rectangle")
+    limits = np.array([plan.robot.joint(name).torque_limit_Nm for name in plan.joints])
+    reference, friction = WalkReference(plan, model, limits), 0.5
+    rows = WholeBodyQP(reference, model, Addresses(model, plan), limits, friction).cone
+    random, side = np.random.default_rng(0), friction / np.sqrt(2.0)
+    for i, sole in enumerate(reference.soles):
+        front, back, left, right = 0.95 * sole
+        corners = [(x, y, 0.0) for x in (front, -back) for y in (left, -right)]
+        given = np.hstack([np.vstack([np.eye(3), np.cross(corner, np.eye(3)).T]) for corner in corners])
+        pyramid = np.array([[1.0, 0.0, -side], [-1.0, 0.0, -side], [0.0, 1.0, -side], [0.0, -1.0, -side]])
+        allowed = 0
+        for _ in range(100):
+            wrench = np.append([*random.uniform(-0.3, 0.3, 2), 1.0], random.uniform(-1.0, 1.0, 3) * [left, front, 0.03])
+            found = linprog(np.zeros(12), np.kron(np.eye(4), pyramid), np.zeros(16), given, wrench, bounds=(None, None))
+            both = np.zeros(12)
+            both[6 * i : 6 * i + 6] = wrench
+            assert (rows @ both >= 0.0).all() == (found.status == 0)
+            allowed += found.status == 0
+        assert 10 < allowed < 90
+
+
+@pytest.fixture(scope="module")
+def standing(plan: Plan) -> Plan:
+    """The first instant of the cycle, held for a while by strong joints; its ZMP is between the feet."""
+    arrays = {name: np.repeat(array[:1], 4, axis=0) for name, array in plan.signals.arrays.items()}
+    arrays |= {"t": np.linspace(0.0, 0.3, 4), "zmp": (arrays["left_foot"] + arrays["right_foot"])[:, :2] / 2}
+    joints = {n: replace(joint, torque_limit_Nm=5.0 * joint.torque_limit_Nm) for n, joint in plan.robot.joints.items()}
+    robot = replace(plan.robot, joints=joints)
+    return replace(plan, robot=robot, signals=replace(plan.signals, arrays=arrays), steps=None)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_steps_from_rest_move_the_mass_as_a_pendulum_and_end_where_they_begin(standing: Plan, first: int) -> None:
+    model, _ = prepare(standing, Conditions(), Drive(), "rectangle")
+    reference = WalkReference(
+        standing, model, np.array([standing.robot.joint(n).torque_limit_Nm for n in standing.joints])
+    )
+    steps = reference.step_from_rest(first)
+    assert [phase.swing for phase in steps.phases] == [None, first, None, 1 - first, None]
+    swing, feet = steps.phases[1], steps.sample("feet", 0.0).reshape(2, 3)
+    begin = steps.sample("dcm", 0.0)
+    for start, stop in ((0.0, swing.start_s), (swing.start_s + 0.002, swing.end_s)):  # the ZMP jumps between them
+        dcm = solve_ivp(
+            lambda t, dcm: steps.rate * (dcm - steps.sample("zmp", t)),
+            (start, stop),
+            steps.sample("dcm", start),
+            rtol=1e-8,
+        ).y[:, -1]
+        np.testing.assert_allclose(steps.sample("dcm", stop), dcm, atol=1e-4)
+    np.testing.assert_allclose(steps.sample("dcm", steps.duration_s), reference.sample("zmp", 0.3), atol=1e-12)
+    np.testing.assert_allclose(begin, reference.sample("zmp", 0.3), atol=0.01)  # pushed off by the foot that swings
+    lifted = steps.sample("feet", (swing.start_s + swing.end_s) / 2).reshape(2, 3) - feet
+    assert lifted[first, 2] > 0.01 and (np.delete(lifted, 3 * first + 2) == 0.0).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("impulse_Ns", "settings", "steps"), [(2.6, (1.0, 0.1), 0), (3.5, (1.0, 0.1), 1), (3.5, (0.2, 0.0), 0)]
+)
+def test_a_robot_at_rest_steps_where_no_zmp_brings_it_back_and_a_foothold_does(
+    standing: Plan, impulse_Ns: float, settings: tuple[float, float], steps: int
+) -> None:
+    reach, hopeless = settings
+    push = Push(impulse_Ns=(impulse_Ns, 0.0), start_s=0.6, duration_s=0.1)
+    run = Run(standing, Conditions(push=push), Drive(balance=Balance(hold=0.0, reach=reach, hopeless=hopeless)))
+    assert run.advance(0.6)
+    balance = run._corrector
+    assert isinstance(balance, WholeBodyBalance)
+    before = balance.clock
+    assert run.advance(0.95)
+    assert (balance.clock is not before) == (steps == 1)
+    if steps:
+        assert balance.find_plan_time(1.0) == 0.3  # the plan waits
+
+
 def advance(run: Run) -> Array:
     assert run.advance(0.8)
     return np.array(run.data.qpos)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("impulse_Ns", "share"), [((2.1, 0.0), 0.45), ((0.0, 2.1), 0.55), ((0.0, -1.8), 0.55)])
+@pytest.mark.parametrize(("impulse_Ns", "share"), [((2.1, 0.0), 0.45), ((0.0, 2.1), 0.45), ((0.0, -1.8), 0.55)])
 def test_a_pushed_walk_stands_with_it_and_falls_without(
     plan: Plan, impulse_Ns: tuple[float, float], share: float
 ) -> None:
@@ -131,6 +209,11 @@ def test_bumps_noise_and_delay_act_and_the_same_seed_gives_the_same_walk(plan: P
     )
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other) and not np.array_equal(first, flat)
+
+
+def test_a_push_after_the_end_is_refused(standing: Plan) -> None:
+    with pytest.raises(InputError, match=r"a push must begin from 0 s to the end of the simulation, 1.3 s, got 2 s"):
+        Run(standing, Conditions(push=Push(impulse_Ns=(1.0, 0.0), start_s=2.0)))
 
 
 def test_settings_that_are_not_allowed_are_refused() -> None:
