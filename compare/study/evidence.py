@@ -277,10 +277,8 @@ def check_between_samples(case: CheckedRun) -> str | None:
     """Judge a point again between the samples, as a run does: on the dense grid, and by proof."""
     assert case.problem is not None  # for the type checker
     stated = case.record.verdict
-    for sharpness in (
-        DECISIVE,
-        MEAN_SHARPNESS,
-    ):  # narrow bounds of means are a third of the work, and rarely change a word
+    # Narrow bounds of means are a third of the work, and rarely change a word.
+    for sharpness in (DECISIVE, MEAN_SHARPNESS):
         again = Verdict.from_evaluation(evaluate(case.problem, case.record.x, mean_sharpness=sharpness))
         words = ["nothing" if v.guaranteed is None else v.guaranteed.word for v in (stated, again)]
         if words[0] == words[1] != "?":

@@ -295,13 +295,13 @@ class WholeBodyBalance:
         return other
 
     @property
-    def _steps(self) -> bool:
+    def _has_stepped(self) -> bool:
         """Whether the robot has left the plan by a step from rest."""
         return self.clock.reference in self._steps_from_rest
 
     def find_plan_time(self, time_s: float) -> float:
         """Return the time of the plan that the robot has reached, and the time since the plan's end [s]."""
-        return (self._plan_s if self._steps else self.clock.time_s) + self.clock.ended_s
+        return (self._plan_s if self._has_stepped else self.clock.time_s) + self.clock.ended_s
 
     def correct(self, command: Array, data: Any) -> Array:
         """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
@@ -328,7 +328,7 @@ class WholeBodyBalance:
             return q.copy() if self._command is None else self._command
         soon = qd + solution.accelerations * s.period_s
         planned, rate = (self.clock.reference.sample(name, self.clock.time_s) for name in ("q", "qd"))
-        hold = 0.0 if self._steps else self._hold
+        hold = 0.0 if self._has_stepped else self._hold
         held, held_rate = q + hold * (planned - q), soon + hold * (self.clock.rate * rate - soon)
         return np.asarray(held + (solution.torques + self._damping * held_rate) / self._stiffness)
 
