@@ -148,9 +148,12 @@ def tabulate_rest(paths: list[str]) -> Iterator[str]:
             bounds = find_bounds(plan, run, pendulum)
             shares = (
                 next(
-                    share
-                    for share in np.arange(0.5, 3.0, RESOLUTION)
-                    if falls(run, (x * share * bounds[way], y * share * bounds[way]), RECOVER / pendulum)
+                    (
+                        share
+                        for share in np.arange(0.5, 3.0, RESOLUTION)
+                        if falls(run, (x * share * bounds[way], y * share * bounds[way]), RECOVER / pendulum)
+                    ),
+                    math.inf,
                 )
                 for way, (x, y) in DIRECTIONS.items()
             )

@@ -13,7 +13,7 @@ import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
-from nlp_gait.backends.solvers.ipopt import BARRIERS, IpoptSettings
+from nlp_gait.backends.solvers.ipopt import BARRIERS, Ipopt, IpoptSettings
 from nlp_gait.errors import InputError, check_count
 from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem, Result, load
@@ -322,7 +322,7 @@ def _solve(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkSettin
 
 def _run_starts(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkSettings) -> Iterator[Solution]:
     """Solve a walk from start points, by each barrier, for which a cycle is solved first if it is given."""
-    rng = np.random.default_rng(0)
+    rng, solvers = np.random.default_rng(0), dict[str, Ipopt]()
     for k in range(check_count("starts", settings.starts)):
         x0: Array = np.clip(problem.start_point(rng), problem.lower, problem.upper)
         if cycle is not None:
@@ -330,8 +330,10 @@ def _run_starts(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkS
             settings.progress(f"start {k + 1}, cycle: {gait.status}")
             x0 = start_from_cycle(problem, x0, gait.x, float(problem.options.get("stair_rise_m", 0.0)))
         for barrier in BARRIERS:
-            solver = IpoptSettings(few_rows=False, barrier=barrier).prepare(problem, solves=MANY_SOLVES)
-            solution = solve(problem, x0=x0, solver=solver, workers=1)
+            if barrier not in solvers:  # the second one is rarely needed
+                ipopt = IpoptSettings(few_rows=False, barrier=barrier)
+                solvers[barrier] = ipopt.prepare(problem, solves=MANY_SOLVES)
+            solution = solve(problem, x0=x0, solver=solvers[barrier], workers=1)
             settings.progress(f"start {k + 1}, {barrier} barrier: {solution.status}")
             yield solution
 

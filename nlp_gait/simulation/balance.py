@@ -45,8 +45,9 @@ class Balance:
     reach: float = 0.6  # farthest foothold from the standing foot, forward and sideways [h]
     gap: float = 0.1  # between soles that pass each other [widths of the sole]
     load_rate: float = 6.0  # of a foot's load after touch-down and before lift-off [weight w]
-    lost: float = 0.01  # distance of the divergent component outside the soles at which a robot at rest steps [h]
-    hopeless: float = 0.03  # error that no foothold may leave for such a step [h]
+    # A robot at rest steps where the divergent component is outside the soles by more than this, and the foothold leaves less
+    step_beyond: float = 0.01  # distance [h]
+    step_error: float = 0.03  # error [h]
     touch: float = 0.05  # load of a foot that has landed
     # Share of the planned angles that drives hold besides the torques of balance, for each m g h of the ankles' stiffness: a
     # stiff robot tips as a block; a compliant one would be turned over by its planned angles where a sole lies tilted
@@ -276,7 +277,7 @@ class WholeBodyBalance:
         self._data = self._engine.MjData(self._model)
         self._addresses = Addresses(self._model, plan)
         reference = WalkReference(plan, self._model, torque_limits)
-        self._steps_from_rest = reference.step_from_rest(0), reference.step_from_rest(1)
+        self._steps_from_rest = reference.make_steps_from_rest(0), reference.make_steps_from_rest(1)
         self._qp = WholeBodyQP(reference, self._model, self._addresses, torque_limits, settings.friction)
         ankles = [plan.joints.index(plan.robot.path_to_root(foot.link)[0].name) for foot in plan.robot.feet.values()]
         stiffest = float(self._stiffness[ankles].max())
@@ -321,7 +322,7 @@ class WholeBodyBalance:
         weight = self.clock.reference.mass * -float(self._model.opt.gravity[2])
         self.clock.advance(state.loads / weight, feet)
         if self.clock.after is None and self.clock.phase.swing is None:
-            self._step_if_lost(data, feet)
+            self._step_if_needed(data, feet)
         solution = self._qp.solve(data, self._collect_targets(data, feet, weight))
         q, qd = data.qpos[joints.angles], data.qvel[joints.rates]
         if solution is None:
@@ -332,15 +333,15 @@ class WholeBodyBalance:
         held, held_rate = q + hold * (planned - q), soon + hold * (self.clock.rate * rate - soon)
         return np.asarray(held + (solution.torques + self._damping * held_rate) / self._stiffness)
 
-    def _step_if_lost(self, data: Any, feet: Array) -> None:
+    def _step_if_needed(self, data: Any, feet: Array) -> None:
         """Begin a step from rest where the divergent component has left the soles (2, 3), and a foothold brings it back."""
         s, reference = self._settings, self.clock.reference
         dcm = data.subtree_com[0, :2] + data.subtree_linvel[0, :2] / reference.rate
         nearest = clip_to_soles(dcm, feet[:, :2], reference.sample("yaw", self.clock.time_s), reference.soles)
-        if np.linalg.norm(dcm - nearest) > s.lost * reference.height:
+        if np.linalg.norm(dcm - nearest) > s.step_beyond * reference.height:
             clocks = [StepClock(s, steps, feet) for steps in self._steps_from_rest]
             errors = [clock.predict_error(dcm) for clock in clocks]
-            if min(errors) < s.hopeless * reference.height:
+            if min(errors) < s.step_error * reference.height:
                 self.clock = clocks[errors.index(min(errors))]
 
     def _collect_targets(self, data: Any, feet: Array, weight: float) -> Targets:

@@ -86,7 +86,7 @@ class WalkReference:
             end += array.shape[1]
         self._last: tuple[float, Array] = (-1.0, self._rows[0])
 
-    def step_from_rest(self, first: int) -> Self:
+    def make_steps_from_rest(self, first: int) -> Self:
         """Return a reference that begins and ends at the end of this one: a step in place of one foot, then of the other.
 
         The centre of mass moves as a pendulum at constant height. Its ZMP is under the foot that will swing first, which pushes

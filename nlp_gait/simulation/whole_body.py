@@ -182,11 +182,8 @@ def _make_cone(soles: Array, friction: float) -> Array:
     for front, back, left, right in 0.95 * soles:
         x, y, ahead, aside = (front + back) / 2, (left + right) / 2, (front - back) / 2, (left - right) / 2
         fx, fy, fz, roll, pitch, yaw = np.eye(WRENCH)
-        roll, pitch, yaw = (
-            roll - aside * fz,
-            pitch + ahead * fz,
-            yaw - ahead * fy + aside * fx,
-        )  # about the sole's centre
+        # Moments about the centre of the sole.
+        roll, pitch, yaw = roll - aside * fz, pitch + ahead * fz, yaw - ahead * fy + aside * fx
         rows = [arm * fz + sign * part for part, arm in ((fx, mu), (fy, mu), (roll, y), (pitch, x)) for sign in (1, -1)]
         for turn, a, b in itertools.product((1, -1), repeat=3):
             rows.append(

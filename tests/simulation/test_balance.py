@@ -141,7 +141,7 @@ def test_steps_from_rest_move_the_mass_as_a_pendulum_and_end_where_they_begin(st
     reference = WalkReference(
         standing, model, np.array([standing.robot.joint(n).torque_limit_Nm for n in standing.joints])
     )
-    steps = reference.step_from_rest(first)
+    steps = reference.make_steps_from_rest(first)
     assert [phase.swing for phase in steps.phases] == [None, first, None, 1 - first, None]
     swing, feet = steps.phases[1], steps.sample("feet", 0.0).reshape(2, 3)
     begin = steps.sample("dcm", 0.0)
@@ -166,9 +166,9 @@ def test_steps_from_rest_move_the_mass_as_a_pendulum_and_end_where_they_begin(st
 def test_a_robot_at_rest_steps_where_no_zmp_brings_it_back_and_a_foothold_does(
     standing: Plan, impulse_Ns: float, settings: tuple[float, float], steps: int
 ) -> None:
-    reach, hopeless = settings
+    reach, error = settings
     push = Push(impulse_Ns=(impulse_Ns, 0.0), start_s=0.6, duration_s=0.1)
-    run = Run(standing, Conditions(push=push), Drive(balance=Balance(hold=0.0, reach=reach, hopeless=hopeless)))
+    run = Run(standing, Conditions(push=push), Drive(balance=Balance(hold=0.0, reach=reach, step_error=error)))
     assert run.advance(0.6)
     balance = run._corrector
     assert isinstance(balance, WholeBodyBalance)
