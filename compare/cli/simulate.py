@@ -220,6 +220,8 @@ def _show_pictures(pictures: Iterator[Frame], count: int) -> Iterator[Frame]:
 
 def _describe(report: Measurements) -> Iterator[str | Rows]:
     fate = "stays up" if report.fell_at_s is None else f"FALLS at {report.fell_at_s:.2f} s"
+    if report.stepped_at_s is not None:
+        fate = f"steps at {report.stepped_at_s:.2f} s and {fate}"
     yield f"The robot {fate}; largest tilt {report.largest_tilt_deg:.1f} degrees"
     powers = [
         (name, *(f"{watts:z.3f}" for watts in (power.mechanical_W, power.heat_W, power.total_W, power.signed_W)))

@@ -2,7 +2,6 @@
 
 import copy
 import math
-from collections import deque
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Self
 
@@ -14,6 +13,7 @@ from nlp_gait.simulation.engine import Addresses, check_period, load_mujoco, mea
 from nlp_gait.simulation.feedback import to_rotation_vector
 from nlp_gait.simulation.footholds import Step, StepLimits, choose_step, clip_to_soles
 from nlp_gait.simulation.plan import Plan
+from nlp_gait.simulation.sampler import Sampler
 from nlp_gait.simulation.walk_reference import SupportPhase, WalkReference
 from nlp_gait.simulation.whole_body import Targets, WholeBodyQP
 
@@ -52,6 +52,7 @@ class Balance:
     # Share of the planned angles that drives hold besides the torques of balance, for each m g h of the ankles' stiffness: a
     # stiff robot tips as a block; a compliant one would be turned over by its planned angles where a sole lies tilted
     hold: float = 1 / 60
+    damp: float = 0.5  # share of the planned rates that drives hold
 
     def __post_init__(self) -> None:
         for setting in fields(self):
@@ -69,53 +70,15 @@ class RobotState(NamedTuple):
     loads: Array  # (2,) normal forces on the feet [N]
 
 
-# Standard deviations of the root's place [m], attitude [rad], velocity [m/s] and rate [rad/s], of joints' angles and rates.
-NOISE = {"place": 5e-4, "attitude": 1e-3, "velocity": 0.012, "rate": 0.01, "angle": 3e-4, "joint_rate": 0.02}
-EARLY = 0.6  # share of a swing after which a contact is a landing
+# Standard deviations of the root's place [m] and attitude [rad], of joints' angles [rad], and of the rates of these.
+NOISE = (5e-4, 1e-3, 3e-4)
+RATE_NOISE = (0.012, 0.01, 0.02)
+EARLY = 0.03  # height of a planned foot above its foothold [h], below which a contact is a landing
 LANDING_SHARE = 0.85  # of a swing, at which the foot is above its foothold
 LANDED_LOAD, EARLY_LOAD, MOST_LOAD = 0.1, 0.1, 3.0  # [weight]
 SEARCH_SPEED, DEEPEST = 0.1, 0.15  # of a foot that is late [h w], [h]
 GOAL_SPEED = 0.8  # of a foothold [h w]
 CLOCK_FILTER, SLOWEST_CLOCK, FASTEST_CLOCK = 0.2, 0.3, 4.0
-
-
-class StateSensor:
-    """Sensors of a whole robot in one simulation, with noise and delay."""
-
-    def __init__(self, settings: Balance, plan: Plan, model: Any) -> None:
-        self._settings, self._plan, self._engine = settings, plan, load_mujoco()
-        self._addresses: Addresses | None = None  # in the simulated model, whose ground may have more geometries
-        self._every = max(1, round(settings.period_s / float(model.opt.timestep)))
-        self._late = round(settings.delay_s / float(model.opt.timestep))
-        self._random = np.random.default_rng(settings.seed)
-        self._waiting: deque[tuple[int, RobotState]] = deque()
-        self._steps = 0
-
-    def read(self, data: Any) -> RobotState | None:
-        """Return the state that arrives at this step of the engine, None if there is none; call it once in each step."""
-        if self._steps % self._every == 0:
-            self._waiting.append((self._steps + self._late, self._measure(data)))
-        arrived = bool(self._waiting) and self._waiting[0][0] <= self._steps
-        self._steps += 1
-        return self._waiting.popleft()[1] if arrived else None
-
-    def _measure(self, data: Any) -> RobotState:
-        if self._addresses is None:
-            self._addresses = Addresses(data.model, self._plan)
-        positions, velocities = data.qpos.copy(), data.qvel.copy()
-        if self._settings.noise > 0.0:
-            joints = len(positions) - 7
-            noise = {
-                name: self._settings.noise
-                * size
-                * self._random.standard_normal(joints if "joint" in name or name == "angle" else 3)
-                for name, size in NOISE.items()
-            }
-            positions[:3] += noise["place"]
-            self._engine.mju_quatIntegrate(positions[3:7], noise["attitude"], 1.0)
-            positions[7:] += noise["angle"]
-            velocities += np.concatenate([noise["velocity"], noise["rate"], noise["joint_rate"]])
-        return RobotState(positions, velocities, measure_loads(data, self._addresses))
 
 
 class StepClock:
@@ -154,6 +117,12 @@ class StepClock:
         left, right = (i != self.phase.swing or self.touched for i in (0, 1))
         return left, right
 
+    @property
+    def rolls(self) -> tuple[bool, bool]:
+        """Whether the feet are on the ground with the tips of their toes only."""
+        left, right = self.reference.sample("rolls", self.time_s) > 0.5
+        return bool(left), bool(right)
+
     def advance(self, loads: Array, feet: Array) -> None:
         """Go on by one period: loads (2,) on the feet in weights, feet (2, 3) their places [m]."""
         settings, reference, phase = self._settings, self.reference, self.phase
@@ -165,12 +134,15 @@ class StepClock:
                 self.origin, self.goal = self.offsets[swing, :2].copy(), self.offsets[1 - swing, :2].copy()
                 self.lowered_m = 0.0
         else:
-            done = (time - phase.start_s) / (phase.end_s - phase.start_s)
             touches = bool(loads[phase.swing] > settings.touch)
-            self.touched = self.touched or (touches and done > EARLY)  # early: it stands, and the clock continues
+            axis = 3 * phase.swing + 2
+            down = reference.sample("feet_rate", time)[axis] < 0.0
+            high = reference.sample("feet", time)[axis] - reference.sample("feet", phase.end_s)[axis]
+            early = bool(down) and high < EARLY * reference.height
+            self.touched = self.touched or (touches and early)  # it stands, and the clock continues
             if time >= phase.end_s and (self.touched or touches or self.lowered_m > DEEPEST * reference.height):
-                self._number += 1 if self.after is not None else 0
-                self.rate, self.touched = 1.0, False
+                self.rate, self.touched = 1.0, self.after is None  # the last foot stays
+                self._number += self.after is not None
             elif time >= phase.end_s:  # late: it goes down until the ground is there
                 time = phase.end_s - 1e-9
                 self.lowered_m += SEARCH_SPEED * reference.height * reference.rate * settings.period_s
@@ -178,7 +150,7 @@ class StepClock:
         self.ended_s += time - self.time_s
         planned = reference.sample("feet", self.time_s).reshape(2, 3)
         for i, stands in enumerate(self.stands):
-            if stands:
+            if stands and not self.rolls[i]:
                 self.offsets[i] = feet[i] - planned[i]
 
     def choose(self, dcm: Array) -> tuple[Step, Array]:
@@ -207,6 +179,7 @@ class StepClock:
     def _find_limits(self, swing: int, time_s: float, to_sole: Array) -> StepLimits:
         """Return the limits of a step in the axes of the standing sole; the ankles' range is that at a time of the plan."""
         s, reference, stance, end = self._settings, self.reference, 1 - swing, self.phase.end_s
+        plan = reference.plan
         feet = reference.sample("feet", time_s).reshape(2, 3)
         zmp = to_sole @ (reference.sample("zmp", time_s) - feet[stance, :2])
         front, back, left, right = s.edge * reference.zmp_reach[stance]
@@ -215,10 +188,14 @@ class StepClock:
         far, side = s.reach * reference.height, 1.0 if swing == 0 else -1.0
         closest = (reference.soles[0, 3] + reference.soles[1, 2]) * (1.0 + s.gap) - side * apart[1]
         low, high = np.minimum(-far - apart, 0.0), np.maximum(far - apart, 0.0)
-        if swing == 0:
+        if plan.planar:
+            low[1] = high[1] = 0.0
+        elif swing == 0:
             low[1] = min(closest, high[1])
         else:
             high[1] = max(-closest, low[1])
+        if plan.ground:  # feet on stairs have no room for other footholds
+            low[0] = high[0] = -self.offsets[stance, 0]
         return StepLimits(
             rate=reference.rate,
             carry=float(reference.sample("carry", end + 1e-6)[0]),
@@ -268,8 +245,6 @@ class WholeBodyBalance:
     def __init__(
         self, settings: Balance, plan: Plan, gains: tuple[Array, Array], torque_limits: Array, model: Any
     ) -> None:
-        if plan.planar:
-            raise InputError("balance feedback needs a robot that moves in space; this one moves in a plane")
         self._settings, self._engine = settings, load_mujoco()
         self._stiffness, self._damping = gains
         self._model = copy.deepcopy(model)
@@ -277,39 +252,50 @@ class WholeBodyBalance:
         self._data = self._engine.MjData(self._model)
         self._addresses = Addresses(self._model, plan)
         reference = WalkReference(plan, self._model, torque_limits)
+        reference.check_support()
         self._steps_from_rest = reference.make_steps_from_rest(0), reference.make_steps_from_rest(1)
         self._qp = WholeBodyQP(reference, self._model, self._addresses, torque_limits, settings.friction)
         ankles = [plan.joints.index(plan.robot.path_to_root(foot.link)[0].name) for foot in plan.robot.feet.values()]
         stiffest = float(self._stiffness[ankles].max())
         self._hold = min(1.0, settings.hold * stiffest / (reference.mass * plan.gravity * reference.height))
-        self._sensor = StateSensor(settings, plan, self._model)
+        self._sampler = Sampler[RobotState](
+            settings.period_s, settings.delay_s, settings.seed, float(model.opt.timestep)
+        )
+        root, joints = plan.root_axes, len(plan.joints)
+        deviations = [
+            np.append(np.repeat(sizes[:2], 3)[root], np.full(joints, sizes[2])) for sizes in (NOISE, RATE_NOISE)
+        ]
+        self._noise = settings.noise * np.array(deviations)
         self.clock, self._plan_s = StepClock(settings, reference), reference.duration_s
         self._command: Array | None = None
+        self.stepped_at_s: float | None = None  # begin of the first step from rest
 
     def fork(self) -> Self:
         """Return a copy for a simulation that begins in the middle of this one."""
         other = copy.copy(self)
-        other._sensor, other.clock = copy.copy(self._sensor), copy.copy(self.clock)
-        other._sensor._random, other._sensor._waiting = copy.deepcopy((self._sensor._random, self._sensor._waiting))
-        clock = other.clock
+        other._sampler, clock = self._sampler.fork(), copy.copy(self.clock)
+        other.clock = clock
         clock.offsets, clock.goal, clock.origin = clock.offsets.copy(), clock.goal.copy(), clock.origin.copy()
         return other
 
-    @property
-    def _has_stepped(self) -> bool:
-        """Whether the robot has left the plan by a step from rest."""
-        return self.clock.reference in self._steps_from_rest
-
     def find_plan_time(self, time_s: float) -> float:
         """Return the time of the plan that the robot has reached, and the time since the plan's end [s]."""
-        return (self._plan_s if self._has_stepped else self.clock.time_s) + self.clock.ended_s
+        return (self.clock.time_s if self.stepped_at_s is None else self._plan_s) + self.clock.ended_s
 
     def correct(self, command: Array, data: Any) -> Array:
         """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
-        state = self._sensor.read(data)
+        state = self._sampler.sample(lambda: self._measure(data))
         if state is not None:
             self._command = self._update(state)
         return command if self._command is None else self._command
+
+    def _measure(self, data: Any) -> RobotState:
+        positions, (error, rate_error) = (
+            data.qpos.copy(),
+            self._noise * self._sampler.random.standard_normal(self._noise.shape),
+        )
+        self._engine.mj_integratePos(self._model, positions, error, 1.0)
+        return RobotState(positions, data.qvel + rate_error, measure_loads(data, self._addresses))
 
     def _update(self, state: RobotState) -> Array:
         """Return the set-points (J,) [rad] that give the torques of balance, damped towards the rates that these reach."""
@@ -329,8 +315,9 @@ class WholeBodyBalance:
             return q.copy() if self._command is None else self._command
         soon = qd + solution.accelerations * s.period_s
         planned, rate = (self.clock.reference.sample(name, self.clock.time_s) for name in ("q", "qd"))
-        hold = 0.0 if self._has_stepped else self._hold
-        held, held_rate = q + hold * (planned - q), soon + hold * (self.clock.rate * rate - soon)
+        hold = self._hold if self.stepped_at_s is None else 0.0
+        q = q + qd * (s.period_s / 2 + s.delay_s)  # drives pull towards the angles of the middle of the period
+        held, held_rate = q + hold * (planned - q), soon + s.damp * (self.clock.rate * rate - soon)
         return np.asarray(held + (solution.torques + self._damping * held_rate) / self._stiffness)
 
     def _step_if_needed(self, data: Any, feet: Array) -> None:
@@ -343,6 +330,7 @@ class WholeBodyBalance:
             errors = [clock.predict_error(dcm) for clock in clocks]
             if min(errors) < s.step_error * reference.height:
                 self.clock = clocks[errors.index(min(errors))]
+                self.stepped_at_s = self.stepped_at_s or self._sampler.time_s
 
     def _collect_targets(self, data: Any, feet: Array, weight: float) -> Targets:
         """Return the accelerations and loads that lead back to the plan."""
@@ -358,23 +346,23 @@ class WholeBodyBalance:
         if clock.phase.swing is not None:
             clock.aim(dcm)
         dcm_offset, zmp_offset = clock.compute_offsets()
-        planned_zmp = sample("zmp") + zmp_offset
         standing = [i for i, stands in enumerate(clock.stands) if stands]
+        planned_zmp = sample("zmp") + zmp_offset
         zmp = planned_zmp + s.dcm_gain * (dcm - sample("dcm") - dcm_offset)
-        zmp = clip_to_soles(zmp, feet[standing, :2], sample("yaw")[standing], s.edge * reference.zmp_reach[standing])
+        zmp = self._clip_to_support(zmp, data, clock.rolls)
         ended = clock.time_s >= reference.duration_s
         mass = np.empty(3)
         mass[:2] = rate**2 * (com[:2] - zmp) + (0.0 if ended else sample("lever"))
         height = sample("com")[2] + np.mean([clock.offsets[i, 2] for i in standing])
-        mass[2] = _track(
-            s.height_rate * rate, height - com[2], sample("com_rate")[2] - velocity[2], sample("com_acceleration")[2]
-        )
+        rising, acceleration = clock.rate * sample("com_rate")[2], clock.rate**2 * sample("com_acceleration")[2]
+        mass[2] = _track(s.height_rate * rate, height - com[2], rising - velocity[2], acceleration)
         mass[2] = np.clip(mass[2], -0.6 * reference.plan.gravity, s.lift * reference.plan.gravity)
         joints = self._addresses
         q_error, qd_error = sample("q") - data.qpos[joints.angles], clock.rate * sample("qd") - data.qvel[joints.rates]
         load = float(sample("load_left")[0])
-        if len(standing) == 2:  # the load is divided as the commanded ZMP divides it
-            apart = feet[0, :2] - feet[1, :2]
+        apart = feet[0, :2] - feet[1, :2]
+        if len(standing) == 2 and np.linalg.norm(apart) > s.step_error * reference.height:
+            # The load is divided as the commanded ZMP divides it
             load = float(np.clip(load + (zmp - planned_zmp) @ apart / (apart @ apart), 0.0, 1.0))
         left, right = (weight * clock.find_most_load(i) for i in (0, 1))
         return Targets(
@@ -382,10 +370,19 @@ class WholeBodyBalance:
             torso=self._turn_torso(data),
             feet=np.stack([self._move_foot(i, data, feet) for i in (0, 1)]),
             stands=clock.stands,
+            rolls=clock.rolls,
             joints=_track(s.joint_rate * rate, q_error, qd_error),
             load_left=load,
             most_load=(left, right),
         )
+
+    def _clip_to_support(self, zmp: Array, data: Any, rolls: Any) -> Array:
+        """Return the nearest point (2,) of the support [m], which of a foot that rolls is the tip of its toe."""
+        clock, reference, joints = self.clock, self.clock.reference, self._addresses
+        standing, rolls = np.flatnonzero(clock.stands), np.array(rolls)[:, None]
+        places = np.where(rolls, data.site_xpos[joints.tips], data.site_xpos[joints.soles])[standing, :2]
+        reach = np.where(rolls, 0.0, self._settings.edge * reference.zmp_reach)[standing]
+        return clip_to_soles(zmp, places, reference.sample("yaw", clock.time_s)[standing], reach)
 
     def _turn_torso(self, data: Any) -> Array:
         """Return the angular acceleration (3,) that leads the torso back to its planned attitude [rad/s^2]."""
@@ -397,17 +394,34 @@ class WholeBodyBalance:
         planned, soon = matrices.reshape(2, 3, 3)
         rate = to_rotation_vector(soon @ planned.T) / ahead * self.clock.rate
         error = to_rotation_vector(planned @ rotation.T)
-        return _track(self._settings.torso_rate * self.clock.reference.rate, error, rate - rotation @ data.qvel[3:6])
+        turning, root = np.zeros((3, self._model.nv)), self._addresses.root
+        engine.mj_jacBody(self._model, data, None, turning, self._addresses.torso)
+        rate_error = rate - turning[:, root] @ data.qvel[root]
+        return _track(self._settings.torso_rate * self.clock.reference.rate, error, rate_error)
 
     def _move_foot(self, foot: int, data: Any, feet: Array) -> Array:
-        """Return the acceleration (6,) of a sole: none if it stands, else along the planned path to the new foothold."""
-        s, clock = self._settings, self.clock
-        reference = clock.reference
-        rate, velocity = s.swing_rate * reference.rate, np.zeros(6)
-        kind = self._engine.mjtObj.mjOBJ_SITE
-        self._engine.mj_objectVelocity(self._model, data, kind, self._addresses.soles[foot], velocity, 0)
-        if clock.stands[foot]:
-            return -2.0 * rate * np.roll(velocity, 3)
+        """Return the acceleration (6,) of a sole: none where it touches the ground, else along the path to the new foothold.
+
+        That of a foot which rolls is of the tip of its toe, and turns as planned.
+        """
+        clock, reference, joints = self.clock, self.clock.reference, self._addresses
+        rate, rolls = self._settings.swing_rate * reference.rate, clock.rolls[foot]
+        velocity = self._measure_velocity(data, joints.soles[foot])
+        if rolls:
+            velocity[:3] = self._measure_velocity(data, joints.tips[foot])[:3]
+        still = -2.0 * rate * velocity
+        if clock.stands[foot] and not rolls:
+            return still
+        yaw, pitch, yaw_rate, pitch_rate = (
+            float(reference.sample(name, clock.time_s)[foot]) for name in ("yaw", "pitch", "yaw_rate", "pitch_rate")
+        )
+        (c, s), (cp, sp) = ((math.cos(angle), math.sin(angle)) for angle in (yaw, pitch))
+        planned = np.array([[c * cp, -s, c * sp], [s * cp, c, s * sp], [-sp, 0.0, cp]])
+        tilt = to_rotation_vector(planned @ data.site_xmat[joints.soles[foot]].reshape(3, 3).T)
+        planned_rate = clock.rate * np.array([-s * pitch_rate, c * pitch_rate, yaw_rate])
+        turn = _track(rate, tilt, planned_rate - velocity[3:])
+        if rolls:
+            return np.concatenate([still[:3], turn])
         phase = clock.phase
         span = LANDING_SHARE * (phase.end_s - phase.start_s)
         done = min(max((clock.time_s - phase.start_s) / span, 0.0), 1.0)
@@ -418,12 +432,13 @@ class WholeBodyBalance:
         place = reference.sample("feet", clock.time_s)[3 * foot : 3 * foot + 3] + offset
         planned_rate = reference.sample("feet_rate", clock.time_s)[3 * foot : 3 * foot + 3].copy()
         planned_rate[:2] += 6.0 * done * (1.0 - done) / span * moved
-        yaw = float(reference.sample("yaw", clock.time_s)[foot])
-        planned = np.array([[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
-        tilt = to_rotation_vector(planned @ data.site_xmat[self._addresses.soles[foot]].reshape(3, 3).T)
-        turning = np.array([0.0, 0.0, clock.rate * reference.sample("yaw_rate", clock.time_s)[foot]])
-        linear = _track(rate, place - feet[foot], clock.rate * planned_rate - velocity[3:])
-        return np.concatenate([linear, _track(rate, tilt, turning - velocity[:3])])
+        return np.concatenate([_track(rate, place - feet[foot], clock.rate * planned_rate - velocity[:3]), turn])
+
+    def _measure_velocity(self, data: Any, site: int) -> Array:
+        """Return the velocity (6,) of a point of the robot, linear [m/s] and angular [rad/s]."""
+        velocity = np.zeros(6)
+        self._engine.mj_objectVelocity(self._model, data, self._engine.mjtObj.mjOBJ_SITE, site, velocity, 0)
+        return np.roll(velocity, 3)
 
 
 def _track(rate: float, error: Any, rate_error: Any, acceleration: Any = 0.0) -> Any:

@@ -46,13 +46,24 @@ class Addresses:
         self.angles = np.array([joint.qposadr[0] for joint in joints])
         self.rates = np.array([joint.dofadr[0] for joint in joints])
         self.actuators = np.array([model.actuator(name).id for name in plan.joints])
+        self.root = np.arange(len(plan.root_axes))  # rates of the root are the engine's first
         self.torso = model.body(plan.robot.root).id
         self.soles = np.array([model.site(side).id for side in SIDES])
-        self.foot_of_geometry = np.full(model.ngeom, -1)
+        # Where a foot that rolls touches the ground
+        self.tips = np.array([model.site(f"{side} tip").id for side in SIDES]) if plan.robot.toes else self.soles
+        self.foot_of_body = np.full(model.nbody, -1)
         for i, side in enumerate(SIDES):
             for contacts in (plan.robot.feet, plan.robot.toes):
                 if side in contacts:
-                    self.foot_of_geometry[model.geom_bodyid == model.body(contacts[side].link).id] = i
+                    self.foot_of_body[model.body(contacts[side].link).id] = i
+
+
+def place_root(positions: Array, plan: Plan, place: Array, attitude: Array) -> None:
+    """Write the root's place (3,) [m] and attitude (4,) into the engine's coordinates, which begin with them."""
+    if plan.planar:
+        positions[:3] = place[0], place[2], 2.0 * np.arctan2(attitude[2], attitude[0])
+    else:
+        positions[:3], positions[3:7] = place, attitude
 
 
 def measure_loads(data: Any, addresses: Addresses) -> Array:
@@ -74,7 +85,8 @@ def _list_contacts(data: Any, addresses: Addresses) -> tuple[Array, Array, Array
     contact = data.contact
     active = contact.efc_address >= 0
     forces = data.efc_force[contact.efc_address[active]]  # the first row of an elliptic contact is along its normal
-    feet = addresses.foot_of_geometry[contact.geom[active].max(axis=1)]  # the ground's geometries come first
+    # The ground's geometries come first
+    feet = addresses.foot_of_body[data.model.geom_bodyid[contact.geom[active].max(axis=1)]]
     return feet, forces, contact.pos[active, :2]
 
 

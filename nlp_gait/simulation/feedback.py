@@ -2,7 +2,6 @@
 
 import copy
 import math
-from collections import deque
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Self
 
@@ -12,6 +11,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.simulation.engine import Addresses, check_period, load_mujoco
 from nlp_gait.simulation.plan import SIDES, Plan
+from nlp_gait.simulation.sampler import Sampler
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,48 +58,12 @@ class Feedback:
 class SensorValues(NamedTuple):
     """Sensor values of the torso at one instant."""
 
-    step: int  # number of the engine's step
+    time_s: float  # of the simulation
     places: Array  # (2, 3) of its origin from the left and the right sole [m]
     velocity: Array  # (3,) [m/s]
     attitude: Array  # (3, 3) rotation from its axes to those of the floor
     tilt_error: Array  # (3,) error of the attitude, about the axes of the floor [rad]
     rate: Array  # (3,) about the axes of the floor [rad/s]
-
-
-class TorsoSensor:
-    """Sensors of one simulation."""
-
-    def __init__(self, feedback: Feedback, plan: Plan, model: Any) -> None:
-        self._feedback, self._model, self._engine = feedback, model, load_mujoco()
-        self._at = Addresses(model, plan)
-        self.step_s = float(model.opt.timestep)
-        self._every = max(1, round(feedback.period_s / self.step_s))
-        self._late = round(feedback.delay_s / self.step_s)
-        self._noise = np.random.default_rng(feedback.seed)
-        self._waiting: deque[SensorValues] = deque()
-        self._steps = 0
-
-    def read(self, data: Any) -> SensorValues | None:
-        """Return values that arrive at this step of the engine, None if there are none; call it once in each step."""
-        if self._steps % self._every == 0:
-            self._waiting.append(self._measure(data))
-        arrived = bool(self._waiting) and self._waiting[0].step + self._late <= self._steps
-        self._steps += 1
-        return self._waiting.popleft() if arrived else None
-
-    def _measure(self, data: Any) -> SensorValues:
-        settings, noise = self._feedback, self._noise.standard_normal((4, 3))
-        turning = np.zeros(6)  # rates, then velocity, along the floor's axes
-        body = self._engine.mjtObj.mjOBJ_XBODY
-        self._engine.mj_objectVelocity(self._model, data, body, self._at.torso, turning, 0)
-        return SensorValues(
-            step=self._steps,
-            places=data.xpos[self._at.torso] - data.site_xpos[self._at.soles] + settings.position_noise_m * noise[0],
-            velocity=turning[3:] + settings.velocity_noise_m_s * noise[1],
-            attitude=data.xmat[self._at.torso].reshape(3, 3).copy(),
-            tilt_error=settings.tilt_noise_rad * noise[2],
-            rate=turning[:3] + settings.rate_noise_rad_s * noise[3],
-        )
 
 
 class BalanceController:
@@ -110,7 +74,9 @@ class BalanceController:
         self._engine = load_mujoco()
         self._posture = self._engine.MjData(model)  # planned angles under an upright torso at the origin
         self._at = Addresses(model, plan)
-        self._sensor = TorsoSensor(feedback, plan, model)
+        self._sampler = Sampler[SensorValues](
+            feedback.period_s, feedback.delay_s, feedback.seed, float(model.opt.timestep)
+        )
         self._shift = np.zeros(len(plan.joints))
         self._integral = np.zeros(6)  # force [N] and moment [Nm]
         mass, height = plan.robot.mass_kg, float(plan.at("hip", np.zeros(1))[0, 2])
@@ -123,8 +89,7 @@ class BalanceController:
     def fork(self) -> Self:
         """Return a copy for a simulation that begins in the middle of this one."""
         other = copy.copy(self)
-        other._sensor = copy.copy(self._sensor)
-        other._sensor._noise, other._sensor._waiting = copy.deepcopy((self._sensor._noise, self._sensor._waiting))
+        other._sampler = self._sampler.fork()
         return other
 
     def find_plan_time(self, time_s: float) -> float:
@@ -133,14 +98,28 @@ class BalanceController:
 
     def correct(self, command: Array, data: Any) -> Array:
         """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
-        measured = self._sensor.read(data)
+        measured = self._sampler.sample(lambda: self._measure(data))
         if measured is not None:
             self._shift = self._torques(measured) / self._stiffness
         return command + self._shift
 
+    def _measure(self, data: Any) -> SensorValues:
+        settings, noise = self._feedback, self._sampler.random.standard_normal((4, 3))
+        turning = np.zeros(6)  # rates, then velocity, along the floor's axes
+        body = self._engine.mjtObj.mjOBJ_XBODY
+        self._engine.mj_objectVelocity(self._model, data, body, self._at.torso, turning, 0)
+        return SensorValues(
+            time_s=self._sampler.time_s,
+            places=data.xpos[self._at.torso] - data.site_xpos[self._at.soles] + settings.position_noise_m * noise[0],
+            velocity=turning[3:] + settings.velocity_noise_m_s * noise[1],
+            attitude=data.xmat[self._at.torso].reshape(3, 3).copy(),
+            tilt_error=settings.tilt_noise_rad * noise[2],
+            rate=turning[:3] + settings.rate_noise_rad_s * noise[3],
+        )
+
     def _torques(self, measured: SensorValues) -> Array:
         """Return the joint torques (J,) of the springs' force and moment [Nm]."""
-        settings, plan, time = self._feedback, self._plan, np.array([measured.step * self._sensor.step_s])
+        settings, plan, time = self._feedback, self._plan, np.array([measured.time_s])
         share = compute_load_shares(plan, time)[0]
         planned, soles = self._planned_posture(time, int(share[1] > share[0]))
         feet = np.stack([plan.at(f"{side}_foot", time)[0] for side in SIDES])
@@ -177,12 +156,21 @@ class BalanceController:
         return attitude, posture.site_xpos[self._at.soles] - posture.xpos[self._at.torso]
 
 
-def compute_load_shares(plan: Plan, times: Array) -> Array:
-    """Return the planned shares of the load on the left and right foot (T, 2); the ZMP between two supporting feet divides it."""
-    left, right = (plan.at(f"{side}_foot", times)[:, :2] for side in SIDES)
-    on_left, on_right = (plan.stands(side, times) for side in SIDES)
+TOGETHER_M = 1e-3  # distance of feet that stand at one place in a plane
+
+
+def compute_load_shares(plan: Plan, times: Array, places: Array | None = None) -> Array:
+    """Return the planned shares of the load on the left and right foot (T, 2): the ZMP between two that bear divides it.
+
+    They bear at the soles, or at places (2, T, 2) [m].
+    """
+    left, right = (plan.at(f"{side}_foot", times)[:, :2] for side in SIDES) if places is None else places
+    on_left, on_right = (plan.bears(side, times) for side in SIDES)
     apart = left - right
-    between = ((plan.at("zmp", times) - right) * apart).sum(axis=1) / (apart**2).sum(axis=1)
+    ahead, squared = ((plan.at("zmp", times) - right) * apart).sum(axis=1), (apart**2).sum(axis=1)
+    between = np.divide(
+        ahead, squared, out=np.full(len(times), 0.5), where=squared > TOGETHER_M**2
+    )  # equal on feet at one place
     share = np.where(on_right == 0.0, 1.0, np.where(on_left == 0.0, 0.0, np.clip(between, 0.0, 1.0)))
     return np.stack([share, 1.0 - share], axis=1)
 

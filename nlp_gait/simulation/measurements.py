@@ -71,10 +71,13 @@ class Measurements:
 
     fallen: bool  #: the torso tilted by more than 45 degrees or sank below 60 % of its height, then or while settling
     fell_at_s: float | None  #: time of the fall; None if it stayed up
+    stepped_at_s: float | None  #: time of a step that balance feedback took at rest; None without one
     largest_tilt_deg: float  #: of the torso, settling included
     tracking_rms_rad: float  #: planned minus measured angle, over all joints
     tracking_max_rad: float  #: largest
-    slip_m: float  #: largest distance of a supporting sole from its place at the begin of its support
+    slip_m: (
+        float  #: largest distance of a supporting sole from its place at the begin of its support, until a step at rest
+    )
     landings: Mapping[str, Landing]  #: by side, of the swinging feet
     #: distance of the centre of pressure, averaged over one set-point period, from the planned ZMP
     pressure_rms_m: float | None
@@ -108,6 +111,7 @@ def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
     return Measurements(
         fallen=simulation.fell_at_s is not None,
         fell_at_s=simulation.fell_at_s,
+        stepped_at_s=simulation.stepped_at_s,
         largest_tilt_deg=math.degrees(float(simulation.tilt.max())),
         tracking_rms_rad=_compute_rms(error),
         tracking_max_rad=float(np.abs(error).max()),
@@ -152,11 +156,12 @@ def average_pressure(simulation: Simulation, period_s: float) -> Array:
 
 
 def _measure_slip(plan: Plan, simulation: Simulation) -> float:
-    feet = {side: simulation.feet[:, SIDES.index(side), :2] for side in SIDES}
+    planned = simulation.t < (simulation.stepped_at_s or math.inf)
+    feet = {side: simulation.feet[planned, SIDES.index(side), :2] for side in SIDES}
     moved = [feet[side] for side in plan.supports]
     if not moved:  # both feet swing: their supports begin and end
         for side, path in feet.items():
-            standing = np.concatenate([[0], plan.stands(side, simulation.plan_t), [0]])
+            standing = np.concatenate([[0], plan.stands(side, simulation.plan_t[planned]), [0]])
             starts, ends = (np.flatnonzero(np.diff(standing) == change) for change in (1, -1))
             moved += [path[start:end] for start, end in zip(starts, ends, strict=True)]
     return max((float(np.linalg.norm(path - path[0], axis=1).max()) for path in moved), default=0.0)

@@ -81,6 +81,10 @@ def make_plan_model(
         Xml.SubElement(
             bodies[foot.link], "site", name=side, pos=_format_numbers(0.0, 0.0, -foot.ankle_height_m), size="0.002"
         )
+    for side, toe in robot.toes.items():
+        Xml.SubElement(
+            bodies[toe.link], "site", name=f"{side} tip", pos=_format_numbers(toe.front_m, 0.0, 0.0), size="0.002"
+        )
     for name, joint in robot.joints.items():
         limit = drive.torque_limit(joint)
         actuator = Xml.SubElement(
@@ -105,14 +109,19 @@ def _add_bumps(world: Xml.Element, plan: Plan, bumps: Bumps) -> None:
     start = np.array([samples[f"{side}_foot"][0, :2] for side in SIDES])
     size, margin = TILE * hip, TILE_MARGIN * hip
     low, high = feet.min(axis=0) - margin, feet.max(axis=0) + margin
+    edges = np.array([tread.edge_m for tread in plan.ground])
     for i, x in enumerate(np.arange(low[0], high[0], size)):
+        back, front = x - size / 2, x + size / 2  # no tile is on two treads
+        back = max([back, *edges[edges <= x]])
+        front = min([front, *edges[edges > x]])
         for j, y in enumerate(np.arange(low[1], high[1], size)):
             top = float(random.uniform(0.0, bumps.height_m))
             if np.abs(start - (x, y)).max(axis=1).min() < margin / 2 + size:
                 continue
-            place = x, y, float(plan.level(np.array([x]))[0]) + top - size / 2
+            place = (back + front) / 2, y, float(plan.level(np.array([x]))[0]) + top - size / 2
+            half = (front - back) / 2, size / 2, size / 2
             box = {"name": f"bump {i} {j}", "type": "box", "contype": "1", "material": "floor"}
-            Xml.SubElement(world, "geom", box, pos=_format_numbers(*place), size=_format_numbers(*np.full(3, size / 2)))
+            Xml.SubElement(world, "geom", box, pos=_format_numbers(*place), size=_format_numbers(*half))
 
 
 def _add_stairs(world: Xml.Element, ground: Sequence[Tread]) -> None:

@@ -40,6 +40,11 @@ class Plan:
         return self.signals.joints
 
     @property
+    def root_axes(self) -> list[int]:
+        """Directions in which the root moves, of x, y, z and rotations about them."""
+        return [0, 2, 4] if self.planar else list(range(6))
+
+    @property
     def duration_s(self) -> float:
         """Duration of the motion."""
         return float(self.signals.arrays["t"][-1])

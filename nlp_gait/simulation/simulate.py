@@ -9,8 +9,9 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Columns, Signals, make_vector_columns
+from nlp_gait.simulation.balance import WholeBodyBalance
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.engine import Addresses, load_mujoco, measure_pressure
+from nlp_gait.simulation.engine import Addresses, load_mujoco, measure_pressure, place_root
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, Bumps, make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
 
@@ -93,6 +94,7 @@ class Simulation:
     loads: Array  #: (T, 2) force of the floor on the left and right foot, along its normal [N]
     pressure: Array  #: (T, 2) centre of pressure of both feet [m]; NaN in flight
     fell_at_s: float | None  #: None if the robot stayed up
+    stepped_at_s: float | None = None  #: begin of a step that balance feedback took at rest
 
     def signals(self, joints: tuple[str, ...]) -> Signals:
         """Return the time histories, for an archive."""
@@ -190,7 +192,8 @@ class Run:
         measured = dict(zip(("t", "set_points", "states", "qd", "torque", *COLUMNS), columns, strict=True))
         measured["q"] = measured["states"][:, self._addresses.angles]
         measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows have its cosine
-        return Simulation(**measured, fell_at_s=self.fell_at_s)
+        stepped = self._corrector.stepped_at_s if isinstance(self._corrector, WholeBodyBalance) else None
+        return Simulation(**measured, fell_at_s=self.fell_at_s, stepped_at_s=stepped)
 
 
 def simulate_plan(
@@ -216,15 +219,8 @@ def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tupl
     engine.mj_setConst(model, data)
     addresses, start = Addresses(model, plan), np.zeros(1)
     data.qvel[:] = 0.0
-    # The root's coordinates are the engine's first.
-    (x, y, z), (vx, vy, vz) = plan.at("hip", start)[0], plan.rate("hip", start)[0]
-    attitude, spin = plan.attitude(start)[0], plan.spin_at_start
-    if plan.planar:
-        data.qpos[:3] = x, z, 2.0 * np.arctan2(attitude[2], attitude[0])
-        data.qvel[:3] = vx, vz, spin[1]
-    else:
-        data.qpos[:3], data.qpos[3:7] = (x, y, z), attitude
-        data.qvel[:3], data.qvel[3:6] = (vx, vy, vz), spin
+    place_root(data.qpos, plan, plan.at("hip", start)[0], plan.attitude(start)[0])
+    data.qvel[addresses.root] = np.append(plan.rate("hip", start)[0], plan.spin_at_start)[plan.root_axes]
     data.qpos[addresses.angles], data.qvel[addresses.rates] = plan.at("q", start)[0], plan.rate("q", start)[0]
     engine.mj_forward(model, data)
     return model, data

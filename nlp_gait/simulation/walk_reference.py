@@ -7,8 +7,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.simulation.engine import Addresses, load_mujoco
+from nlp_gait.simulation.engine import Addresses, load_mujoco, place_root
 from nlp_gait.simulation.feedback import compute_load_shares
 from nlp_gait.simulation.plan import SIDES, Plan
 
@@ -35,7 +36,8 @@ class WalkReference:
 
     Names are ``q``, ``qd``, ``zmp`` (2,), ``com``, ``com_rate``, ``com_acceleration`` (3,), ``dcm`` (2,), ``lever`` (2,) what the
     pendulum leaves of the horizontal acceleration, ``load_left`` (1,), ``carry`` (1,) effect of the next foothold on the
-    divergent component, ``feet``, ``feet_rate`` (6,), ``yaw``, ``yaw_rate`` (2,) of the soles, ``attitude`` (4,) of the torso.
+    divergent component, ``feet``, ``feet_rate`` (6,), ``yaw``, ``yaw_rate``, ``pitch``, ``pitch_rate`` (2,) of the soles,
+    ``rolls`` (2,) whether a foot is on the tip of its toe, ``attitude`` (4,) of the torso.
     """
 
     def __init__(self, plan: Plan, model: Any, torque_limits: Array) -> None:
@@ -43,13 +45,18 @@ class WalkReference:
         self.mass = float(model.body_subtreemass[0])
         count = int(np.ceil(plan.duration_s / STEP_S)) + 2
         times = np.linspace(0.0, count * STEP_S, count, endpoint=False)
-        com = _follow_mass(plan, model, times)
+        com, tips, pitch = _follow_joints(plan, model, times)
         self.height = float(com[0, 2] - min(plan.at(f"{side}_foot", times[:1])[0, 2] for side in SIDES))
         self.rate = float(np.sqrt(plan.gravity / self.height))  # of the pendulum [1/s]
         self.soles = np.array([[f.front_m, f.back_m, f.left_m, f.right_m] for f in (plan.robot.feet[s] for s in SIDES)])
         self.zmp_reach = np.minimum(self.soles, _find_ankle_reach(plan, model, torque_limits))
-        stands = np.stack([plan.stands(side, times) for side in SIDES], axis=1) > 0.5
-        self.phases = _split(times, stands)
+        stands, bears = (
+            np.stack([on(side, times) for side in SIDES], axis=1) > 0.5 for on in (plan.stands, plan.bears)
+        )
+        self.phases, rolls = _split(times, bears), bears & ~stands
+        places = np.where(
+            rolls.T[:, :, None], tips, np.stack([plan.at(f"{side}_foot", times)[:, :2] for side in SIDES])
+        )
         feet = np.concatenate([plan.at(f"{side}_foot", times) for side in SIDES], axis=1)
         yaw = np.stack([np.arctan2(*plan.direction(i, times).T[::-1]) for i in range(2)], axis=1)
         velocity = np.gradient(com, STEP_S, axis=0)
@@ -59,7 +66,7 @@ class WalkReference:
         acceleration = np.stack(
             [np.convolve(np.pad(a, pad, mode="edge"), kernel, "valid") for a in acceleration.T], axis=1
         )
-        zmp, load = plan.at("zmp", times), compute_load_shares(plan, times)[:, 0]
+        zmp, load = plan.at("zmp", times), compute_load_shares(plan, times, places)[:, 0]
         arrays = {
             "q": plan.at("q", times),
             "qd": plan.rate("q", times),
@@ -75,9 +82,27 @@ class WalkReference:
             "feet_rate": np.gradient(feet, STEP_S, axis=0),
             "yaw": yaw,
             "yaw_rate": np.gradient(np.unwrap(yaw, axis=0), STEP_S, axis=0),
+            "pitch": pitch,
+            "pitch_rate": np.gradient(pitch, STEP_S, axis=0),
+            "rolls": rolls.astype(float),
             "attitude": plan.attitude(times),
         }
         self._store(arrays)
+
+    def check_support(self) -> None:
+        """Raise InputError for a plan that leans on a toe in single support: its torque is no part of the balance."""
+        for phase in self.phases:
+            if self.plan.robot.toes and phase.swing is not None:
+                times = np.arange(phase.start_s, phase.end_s, STEP_S)
+                zmp, foot = (
+                    self._rows[np.round(times / STEP_S).astype(int), self._columns[n]] for n in ("zmp", "feet")
+                )
+                on_toe = (zmp[:, 0] - foot[:, 3 * (1 - phase.swing)]).max() - self.soles[1 - phase.swing, 0]
+                if on_toe > 0.0:
+                    raise InputError(
+                        f"balance feedback keeps the ZMP of single support on the sole; this plan's is {1e3 * on_toe:.0f} mm "
+                        "ahead of it, on the toe; simulate the plan without feedback"
+                    )
 
     def _store(self, arrays: dict[str, Array]) -> None:
         self._rows, self._columns, end = np.hstack(list(arrays.values())), dict[str, slice](), 0
@@ -128,18 +153,24 @@ class WalkReference:
         return np.asarray(self._last[1][self._columns[name]])
 
 
-def _follow_mass(plan: Plan, model: Any, times: Array) -> Array:
-    """Return the planned centre of mass (T, 3) [m]."""
+def _follow_joints(plan: Plan, model: Any, times: Array) -> tuple[Array, Array, Array]:
+    """Return the planned centre of mass (T, 3), tips of the toes (2, T, 2) [m], and pitch of the soles (T, 2) [rad].
+
+    Soles without toes stay level.
+    """
     engine, addresses = load_mujoco(), Addresses(model, plan)
-    data, com = engine.MjData(model), np.zeros((len(times), 3))
+    data, com, tips, pitch = engine.MjData(model), *(np.zeros((len(times), *shape)) for shape in ((3,), (2, 2), (2,)))
     for k, (place, attitude, q) in enumerate(
         zip(plan.at("hip", times), plan.attitude(times), plan.at("q", times), strict=True)
     ):
-        data.qpos[:3], data.qpos[3:7], data.qpos[addresses.angles] = place, attitude, q
+        place_root(data.qpos, plan, place, attitude)
+        data.qpos[addresses.angles] = q
         engine.mj_kinematics(model, data)
         engine.mj_comPos(model, data)
-        com[k] = data.subtree_com[0]
-    return com
+        com[k], tips[k] = data.subtree_com[0], data.site_xpos[addresses.tips, :2]
+        if plan.robot.toes:
+            pitch[k] = np.arctan2(-data.site_xmat[addresses.soles, 6], data.site_xmat[addresses.soles, 8])
+    return com, tips.swapaxes(0, 1), pitch
 
 
 def _find_ankle_reach(plan: Plan, model: Any, torque_limits: Array) -> Array:
@@ -162,9 +193,9 @@ def _find_ankle_reach(plan: Plan, model: Any, torque_limits: Array) -> Array:
     return reach
 
 
-def _split(times: Array, stands: Any) -> list[SupportPhase]:
-    """Return the phases of a walk from the times (T,) at which the feet (T, 2) stand."""
-    swing = np.where(stands.all(axis=1), -1, np.where(stands[:, 0], 1, 0))
+def _split(times: Array, bears: Any) -> list[SupportPhase]:
+    """Return the phases of a walk from the times (T,) at which the feet (T, 2) bear."""
+    swing = np.where(bears.all(axis=1), -1, np.where(bears[:, 0], 1, 0))
     cuts = [0, *(np.flatnonzero(np.diff(swing)) + 1).tolist(), len(swing) - 1]
     return [
         SupportPhase(float(times[a]), float(times[b]), None if swing[a] < 0 else int(swing[a]))

@@ -40,6 +40,7 @@ class Targets:
     torso: Array  #: (3,) angular [rad/s^2]
     feet: Array  #: (2, 6) of the soles, linear [m/s^2] and angular [rad/s^2]
     stands: tuple[bool, bool]  #: whether a foot is on the ground
+    rolls: tuple[bool, bool]  #: with the tip of its toe only
     joints: Array  #: (J,) [rad/s^2]
     load_left: float  #: planned share of the weight on the left foot
     most_load: tuple[float, float]  #: largest normal forces [N]
@@ -74,13 +75,11 @@ class WholeBodyQP:
                 f"balance feedback needs DAQP ({error}); install it with pip install 'nlp-gait[sim]'"
             ) from error
         self._solver, self._engine, self.weights = daqp, load_mujoco(), Weights()
-        self._model, self._limits, self._rates = model, torque_limits, addresses.rates
-        self._soles, self._feet = addresses.soles, model.site_bodyid[addresses.soles]
+        self._model, self._limits, self._at = model, torque_limits, addresses
         self._height, self._gravity, self._mass = reference.height, model.opt.gravity.copy(), reference.mass
         angles = reference.plan.signals.arrays["q"]
         held = np.ptp(angles, axis=0) < 1e-6
-        self._held = self._rates[held]
-        self._free = np.concatenate([np.arange(6), self._rates[~held]])
+        self._free = np.concatenate([addresses.root, addresses.rates[~held]])
         self._free_joints = np.flatnonzero(~held)
         self.cone = _make_cone(reference.soles, friction)
         self.failures = 0
@@ -91,28 +90,31 @@ class WholeBodyQP:
         ``data`` has the measured positions and velocities, with positions and velocities computed.
         """
         engine, model, free, count = self._engine, self._model, self._free, len(self._free)
+        joints, root = self._at.rates, len(self._at.root)
         inertia, acceleration = np.zeros((model.nv, model.nv)), np.zeros(model.nv)
         engine.mj_fullM(model, data, inertia)
-        acceleration[self._rates] = targets.joints
+        acceleration[joints] = targets.joints
         acceleration[free] = 0.0
-        jacobians, drift = self._differentiate_soles(data)
-        contact = np.concatenate([self._turn_into_sole(data, i, jacobians[i].T) for i in (0, 1)], axis=1)
-        tasks, goals, weights = self._collect_tasks(data, targets, jacobians, drift + jacobians @ acceleration)
+        jacobians, drift = self._differentiate_soles(data, targets.rolls)
+        axes = data.site_xmat[self._at.soles].reshape(2, 3, 3)
+        axes[list(targets.rolls)] = np.eye(3)
+        contact = np.hstack([part.T @ axes[i] for i in (0, 1) for part in (jacobians[i, :3], jacobians[i, 3:])])
+        known = drift + jacobians @ acceleration
+        tasks, goals, weights = self._collect_tasks(data, targets, jacobians, known, axes)
         weighted = tasks * weights[:, None]
         hessian, linear = weighted.T @ tasks, -(goals @ weighted)
         hessian[np.diag_indices(len(hessian))] += REGULARISATION
         # Torques of all coordinates: motion @ x + rest; those of the root are zero.
         motion, bias = np.hstack([inertia[:, free], -contact]), data.qfrc_bias + inertia @ acceleration
-        joints = self._rates
-        rows = np.vstack([motion[:6], motion[joints], np.hstack([np.zeros((len(self.cone), count)), self.cone])])
-        low = np.concatenate([-bias[:6], -self._limits - bias[joints], np.zeros(len(self.cone))])
-        high = np.concatenate([-bias[:6], self._limits - bias[joints], np.full(len(self.cone), UNBOUNDED)])
+        rows = np.vstack([motion[:root], motion[joints], np.hstack([np.zeros((len(self.cone), count)), self.cone])])
+        low = np.concatenate([-bias[:root], -self._limits - bias[joints], np.zeros(len(self.cone))])
+        high = np.concatenate([-bias[:root], self._limits - bias[joints], np.full(len(self.cone), UNBOUNDED)])
         least, most, kind = self._bound_wrenches(targets)
         low = np.concatenate([np.full(count, -UNBOUNDED), least, low])
         high = np.concatenate([np.full(count, UNBOUNDED), most, high])
         sense = np.zeros(len(low), dtype=np.int32)
         sense[count : count + 2 * WRENCH] = kind
-        sense[count + 2 * WRENCH : count + 2 * WRENCH + 6] = EQUAL
+        sense[count + 2 * WRENCH : count + 2 * WRENCH + root] = EQUAL
         x, _, flag, _ = self._solver.solve(hessian, linear, rows, high, low, sense)
         if flag <= 0:
             self.failures += 1
@@ -121,37 +123,43 @@ class WholeBodyQP:
         torques = np.clip((motion @ x + bias)[joints], -self._limits, self._limits)
         return Torques(torques, acceleration[joints], x[count:])
 
-    def _differentiate_soles(self, data: Any) -> tuple[Array, Array]:
-        """Return the soles' Jacobians (2, 6, V), and their accelerations (2, 6) at constant velocities."""
+    def _differentiate_soles(self, data: Any, rolls: tuple[bool, bool]) -> tuple[Array, Array]:
+        """Return the soles' Jacobians (2, 6, V), and their accelerations (2, 6) at constant velocities.
+
+        Of a foot that rolls, the linear ones are those of the tip of its toe.
+        """
         engine, model = self._engine, self._model
         jacobians, rates = np.zeros((2, 6, model.nv)), np.zeros((2, 6, model.nv))
-        for i, (sole, foot) in enumerate(zip(self._soles, self._feet, strict=True)):
+        for i, sole in enumerate(self._at.soles):
             engine.mj_jacSite(model, data, jacobians[i, :3], jacobians[i, 3:], sole)
-            engine.mj_jacDot(model, data, rates[i, :3], rates[i, 3:], data.site_xpos[sole], foot)
+            engine.mj_jacDot(model, data, rates[i, :3], rates[i, 3:], data.site_xpos[sole], model.site_bodyid[sole])
+            if rolls[i]:
+                tip = self._at.tips[i]
+                engine.mj_jacSite(model, data, jacobians[i, :3], None, tip)
+                engine.mj_jacDot(model, data, rates[i, :3], None, data.site_xpos[tip], model.site_bodyid[tip])
         return jacobians, rates @ data.qvel
 
-    def _turn_into_sole(self, data: Any, i: int, rows: Array) -> Array:
-        """Return forces and moments (V, 6) along the floor's axes along those of a sole."""
-        axes = data.site_xmat[self._soles[i]].reshape(3, 3)
-        return np.hstack([rows[:, :3] @ axes, rows[:, 3:] @ axes])
-
-    def _collect_tasks(self, data: Any, targets: Targets, jacobians: Array, known: Array) -> tuple[Array, Array, Array]:
+    def _collect_tasks(
+        self, data: Any, targets: Targets, jacobians: Array, known: Array, axes: Array
+    ) -> tuple[Array, Array, Array]:
         """Return matrix, goals and weights of all tasks: feet, mass, torso, joints, loads; ``known`` (2, 6) is not variable."""
-        w, free, count = self.weights, self._free, len(self._free)
+        w, free, count, root = self.weights, self._free, len(self._free), len(self._at.root)
         moving = len(self._free_joints)
         ends = np.cumsum([0, 12, 3, 3, moving, 12]).tolist()
         feet, mass, torso, joints, loads = map(slice, ends[:-1], ends[1:])
         tasks, goals, weights = (np.zeros(shape) for shape in ((ends[-1], count + 12), ends[-1], ends[-1]))
         tasks[feet, :count], goals[feet] = jacobians[:, :, free].reshape(12, -1), (targets.feet - known).ravel()
-        swing = np.repeat([w.swing, w.swing_attitude * self._height**2], 3)
-        weights[feet] = np.concatenate([np.full(6, w.stance) if stands else swing for stands in targets.stands])
+        for i, (stands, rolls) in enumerate(zip(targets.stands, targets.rolls, strict=True)):
+            weights[6 * i : 6 * i + 3] = w.stance if stands else w.swing
+            weights[6 * i + 3 : 6 * i + 6] = w.stance if stands and not rolls else w.swing_attitude * self._height**2
         for i in (0, 1):  # contact forces alone move the mass
-            axes = data.site_xmat[self._soles[i]].reshape(3, 3)
-            tasks[mass, count + WRENCH * i : count + WRENCH * i + 3] = axes / self._mass
+            tasks[mass, count + WRENCH * i : count + WRENCH * i + 3] = axes[i] / self._mass
         goals[mass], weights[mass] = targets.mass - self._gravity, (w.mass, w.mass, w.height)
-        tasks[torso, 3:6] = data.xmat[1].reshape(3, 3)  # rates of the root are in its own axes
+        turning = np.zeros((3, self._model.nv))
+        self._engine.mj_jacBody(self._model, data, None, turning, self._at.torso)
+        tasks[torso, :root] = turning[:, self._at.root]
         goals[torso], weights[torso] = targets.torso, np.array([w.torso, w.torso, w.turn]) * self._height**2
-        tasks[joints, 6:count] = np.eye(moving)
+        tasks[joints, root:count] = np.eye(moving)
         goals[joints], weights[joints] = targets.joints[self._free_joints], w.joints * self._height**2
         tasks[loads, count:] = np.diag(np.tile(np.repeat([1.0, 2.0 / self._height], 3), 2)) / self._mass
         weight = -self._gravity[2]
@@ -160,11 +168,11 @@ class WholeBodyQP:
         return tasks, goals, weights
 
     def _bound_wrenches(self, targets: Targets) -> tuple[Array, Array, Array]:
-        """Return lower and upper bounds and kinds (12,) of the wrenches: zero for a foot in the air."""
+        """Return lower and upper bounds and kinds (12,) of the wrenches: zero for a foot in the air, no moments at a tip."""
         low, high, kind = np.zeros(12), np.zeros(12), np.full(12, float(EQUAL))
-        for i, stands in enumerate(targets.stands):
+        for i, (stands, rolls) in enumerate(zip(targets.stands, targets.rolls, strict=True)):
             if stands:
-                wrench = slice(WRENCH * i, WRENCH * (i + 1))
+                wrench = slice(WRENCH * i, WRENCH * i + (3 if rolls else WRENCH))
                 low[wrench], high[wrench], kind[wrench] = -UNBOUNDED, UNBOUNDED, INEQUALITY
                 high[WRENCH * i + 2] = targets.most_load[i]
         return low, high, kind

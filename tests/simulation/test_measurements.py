@@ -94,6 +94,11 @@ def test_angles_power_and_falls_are_those_of_the_phase() -> None:
     assert (found.measured.mechanical_W, found.measured.signed_W) == pytest.approx((0.6, 0.4))
     assert (found.predicted.heat_W, found.measured.heat_W) == pytest.approx((0.125, 0.125))
     assert found.measured.total_W == pytest.approx(0.725)
+    slipped = traced()
+    slipped.feet[1900:, 0, 0] = 0.02
+    assert measure(planned(), slipped, Drive()).slip_m == pytest.approx(0.02)
+    stepped = measure(planned(), replace(slipped, stepped_at_s=0.9), Drive())
+    assert (stepped.slip_m, stepped.stepped_at_s) == (0.0, 0.9)
     fallen = measured(fell_at_s=1.1)
     assert (fallen.fallen, fallen.fell_at_s) == (True, 1.1)
 

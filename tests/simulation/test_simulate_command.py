@@ -8,6 +8,7 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.gaits.stairs.track import PLAN
 from tests.compare.cli.calls import as_json, one_sentence
@@ -15,8 +16,10 @@ from tests.compare.cli.calls import as_json, one_sentence
 mujoco = pytest.importorskip("mujoco")
 pytestmark = pytest.mark.slow  # each gait is simulated
 
+from nlp_gait.simulation.balance import Balance  # noqa: E402
 from nlp_gait.simulation.drive import Drive, load_drive  # noqa: E402
 from nlp_gait.simulation.measurements import Measurements, measure, measure_climb  # noqa: E402
+from nlp_gait.simulation.mjcf import Bumps  # noqa: E402
 from nlp_gait.simulation.plan import SIDES, Plan, make_plan  # noqa: E402
 from nlp_gait.simulation.simulate import Conditions, Simulation, prepare, simulate_plan  # noqa: E402
 
@@ -85,6 +88,28 @@ def test_one_optimum_climbs_four_stairs_and_ten_from_standing_to_standing() -> N
         assert climb.climbed == climb.stairs == stairs and max(climb.landing_errors_m) < 0.02
         assert climb.hip_rises_m == pytest.approx(climb.planned_rises_m, abs=0.005)
         assert count_shank_contacts(plan, trace) == 0
+        if stairs == 4:
+            climb_on_bumps(plan)
+
+
+def climb_on_bumps(plan: Plan) -> None:
+    """With errors of mass, friction and sensors, too; alone, it falls on the bumps."""
+    worse = Conditions(bumps=Bumps(height_m=0.005, seed=1), mass_factor=1.05, friction=0.5)
+    climb, alone = (
+        measure_climb(plan, simulate_plan(plan, conditions, drive))
+        for conditions, drive in (
+            (worse, Drive(balance=Balance(noise=1.0, delay_s=0.004, seed=1))),
+            (Conditions(bumps=worse.bumps), Drive()),
+        )
+    )
+    assert climb.climbed == climb.stairs == 4 and max(climb.landing_errors_m) < 0.02
+    assert alone.climbed < 4
+
+
+def test_balance_refuses_a_plan_that_leans_on_its_toe() -> None:
+    plan = make_plan(Result(problem=(problem := nlp_gait.load("stairs-plan")), x=problem.check_x(FREE)))
+    with pytest.raises(InputError, match="keeps the ZMP of single support on the sole; this plan's is .* on the toe"):
+        simulate_plan(plan, drive=Drive(balance=Balance()))
 
 
 def test_tracked_steps_climb_with_stiff_gains_and_fall_with_the_papers() -> None:

@@ -1,0 +1,40 @@
+"""Measurements of a feedback: at even times, noisy, and known after a delay."""
+
+import copy
+from collections import deque
+from collections.abc import Callable
+from typing import Generic, Self, TypeVar
+
+import numpy as np
+
+V = TypeVar("V")
+
+
+class Sampler(Generic[V]):
+    """Takes the measurements of one simulation, whose noise is drawn from ``random``."""
+
+    def __init__(self, period_s: float, delay_s: float, seed: int, step_s: float) -> None:
+        """Begin at a simulation's begin; ``step_s`` is that of the engine [s]."""
+        self.random = np.random.default_rng(seed)
+        self._step_s, self._every, self._late = step_s, max(1, round(period_s / step_s)), round(delay_s / step_s)
+        self._waiting: deque[tuple[int, V]] = deque()
+        self._steps = 0
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time [s]."""
+        return self._steps * self._step_s
+
+    def sample(self, measure: Callable[[], V]) -> V | None:
+        """Return the measurement that arrives at this step of the engine, None if there is none; call it once in each step."""
+        if self._steps % self._every == 0:
+            self._waiting.append((self._steps + self._late, measure()))
+        arrived = bool(self._waiting) and self._waiting[0][0] <= self._steps
+        self._steps += 1
+        return self._waiting.popleft()[1] if arrived else None
+
+    def fork(self) -> Self:
+        """Return a copy for a simulation that begins in the middle of this one."""
+        other = copy.copy(self)
+        other.random, other._waiting = copy.deepcopy(self.random), self._waiting.copy()
+        return other
