@@ -75,6 +75,7 @@ NOISE = (5e-4, 1e-3, 3e-4)
 RATE_NOISE = (0.012, 0.01, 0.02)
 EARLY = 0.03  # height of a planned foot above its foothold [h], below which a contact is a landing
 LANDING_SHARE = 0.85  # of a swing, at which the foot is above its foothold
+TOGETHER = 0.03  # distance of feet in one plane [h], below which it does not matter which of them bears
 LANDED_LOAD, EARLY_LOAD, MOST_LOAD = 0.1, 0.1, 3.0  # [weight]
 SEARCH_SPEED, DEEPEST = 0.1, 0.15  # of a foot that is late [h w], [h]
 GOAL_SPEED = 0.8  # of a foothold [h w]
@@ -349,7 +350,7 @@ class WholeBodyBalance:
         standing = [i for i, stands in enumerate(clock.stands) if stands]
         planned_zmp = sample("zmp") + zmp_offset
         zmp = planned_zmp + s.dcm_gain * (dcm - sample("dcm") - dcm_offset)
-        zmp = self._clip_to_support(zmp, data, clock.rolls)
+        zmp = self._clip_to_support(zmp, data)
         ended = clock.time_s >= reference.duration_s
         mass = np.empty(3)
         mass[:2] = rate**2 * (com[:2] - zmp) + (0.0 if ended else sample("lever"))
@@ -361,7 +362,7 @@ class WholeBodyBalance:
         q_error, qd_error = sample("q") - data.qpos[joints.angles], clock.rate * sample("qd") - data.qvel[joints.rates]
         load = float(sample("load_left")[0])
         apart = feet[0, :2] - feet[1, :2]
-        if len(standing) == 2 and np.linalg.norm(apart) > s.step_error * reference.height:
+        if len(standing) == 2 and np.linalg.norm(apart) > TOGETHER * reference.height:
             # The load is divided as the commanded ZMP divides it
             load = float(np.clip(load + (zmp - planned_zmp) @ apart / (apart @ apart), 0.0, 1.0))
         left, right = (weight * clock.find_most_load(i) for i in (0, 1))
@@ -376,10 +377,10 @@ class WholeBodyBalance:
             most_load=(left, right),
         )
 
-    def _clip_to_support(self, zmp: Array, data: Any, rolls: Any) -> Array:
+    def _clip_to_support(self, zmp: Array, data: Any) -> Array:
         """Return the nearest point (2,) of the support [m], which of a foot that rolls is the tip of its toe."""
         clock, reference, joints = self.clock, self.clock.reference, self._addresses
-        standing, rolls = np.flatnonzero(clock.stands), np.array(rolls)[:, None]
+        standing, rolls = np.flatnonzero(clock.stands), np.array(clock.rolls)[:, None]
         places = np.where(rolls, data.site_xpos[joints.tips], data.site_xpos[joints.soles])[standing, :2]
         reach = np.where(rolls, 0.0, self._settings.edge * reference.zmp_reach)[standing]
         return clip_to_soles(zmp, places, reference.sample("yaw", clock.time_s)[standing], reach)
