@@ -291,15 +291,12 @@ class WholeBodyBalance:
         return command if self._command is None else self._command
 
     def _measure(self, data: Any) -> RobotState:
-        positions, (error, rate_error) = (
-            data.qpos.copy(),
-            self._noise * self._sampler.random.standard_normal(self._noise.shape),
-        )
-        self._engine.mj_integratePos(self._model, positions, error, 1.0)
-        return RobotState(positions, data.qvel + rate_error, measure_loads(data, self._addresses))
+        positions, noise = data.qpos.copy(), self._noise * self._sampler.random.standard_normal(self._noise.shape)
+        self._engine.mj_integratePos(self._model, positions, noise[0], 1.0)
+        return RobotState(positions, data.qvel + noise[1], measure_loads(data, self._addresses))
 
     def _update(self, state: RobotState) -> Array:
-        """Return the set-points (J,) [rad] that give the torques of balance, damped towards the rates that these reach."""
+        """Return the set-points (J,) [rad] that give the torques of balance, damped towards planned rates."""
         s, data, engine, joints = self._settings, self._data, self._engine, self._addresses
         data.qpos[:], data.qvel[:] = state.positions, state.velocities
         engine.mj_fwdPosition(self._model, data)
