@@ -146,18 +146,17 @@ def tabulate_rest(paths: list[str]) -> Iterator[str]:
                 yield cells(name, feedback, f"falls at {run.fell_at_s:.1f} s", "", "", "", tick)
                 continue
             bounds = find_bounds(plan, run, pendulum)
-            shares = (
-                next(
-                    (
-                        share
-                        for share in np.arange(0.5, 3.0, RESOLUTION)
-                        if falls(run, (x * share * bounds[way], y * share * bounds[way]), RECOVER / pendulum)
-                    ),
-                    math.inf,
-                )
-                for way, (x, y) in DIRECTIONS.items()
-            )
+            shares = (find_least_share(run, way, bounds[way], RECOVER / pendulum) for way in DIRECTIONS)
             yield cells(name, feedback, *(f"{share:.2f}" for share in shares), tick)
+
+
+def find_least_share(run: Run, direction: str, bound_Ns: float, settle_s: float) -> float:
+    """Return the least share of a bound [N s] that fells a robot, infinite if none does."""
+    x, y = DIRECTIONS[direction]
+    for share in np.arange(0.5, 3.0, RESOLUTION):
+        if falls(run, (x * share * bound_Ns, y * share * bound_Ns), settle_s):
+            return float(share)
+    return math.inf
 
 
 def find_bounds(plan: Plan, run: Run, pendulum: float) -> dict[str, float]:

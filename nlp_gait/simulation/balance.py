@@ -75,7 +75,7 @@ NOISE = (5e-4, 1e-3, 3e-4)
 RATE_NOISE = (0.012, 0.01, 0.02)
 EARLY = 0.03  # height of a planned foot above its foothold [h], below which a contact is a landing
 LANDING_SHARE = 0.85  # of a swing, at which the foot is above its foothold
-TOGETHER = 0.03  # distance of feet in one plane [h], below which it does not matter which of them bears
+TOGETHER = 0.03  # feet of a planar robot nearer than this [h] share the load as planned
 LANDED_LOAD, EARLY_LOAD, MOST_LOAD = 0.1, 0.1, 3.0  # [weight]
 SEARCH_SPEED, DEEPEST = 0.1, 0.15  # of a foot that is late [h w], [h]
 GOAL_SPEED = 0.8  # of a foothold [h w]
@@ -150,9 +150,8 @@ class StepClock:
         self.time_s = min(time, reference.duration_s)
         self.ended_s += time - self.time_s
         planned = reference.sample("feet", self.time_s).reshape(2, 3)
-        for i, stands in enumerate(self.stands):
-            if stands and not self.rolls[i]:
-                self.offsets[i] = feet[i] - planned[i]
+        flat = np.logical_and(self.stands, np.logical_not(self.rolls))
+        self.offsets[flat] = (feet - planned)[flat]
 
     def choose(self, dcm: Array) -> tuple[Step, Array]:
         """Return the step by the divergent component (2,) [m], and the rotation (2, 2) into the axes of the standing sole."""
@@ -305,23 +304,23 @@ class WholeBodyBalance:
         feet = data.site_xpos[joints.soles].copy()
         weight = self.clock.reference.mass * -float(self._model.opt.gravity[2])
         self.clock.advance(state.loads / weight, feet)
+        dcm = data.subtree_com[0, :2] + data.subtree_linvel[0, :2] / self.clock.reference.rate
         if self.clock.after is None and self.clock.phase.swing is None:
-            self._step_if_needed(data, feet)
-        solution = self._qp.solve(data, self._collect_targets(data, feet, weight))
+            self._step_if_needed(dcm, feet)
+        solution = self._qp.solve(data, self._collect_targets(data, dcm, feet, weight))
         q, qd = data.qpos[joints.angles], data.qvel[joints.rates]
         if solution is None:
             return q.copy() if self._command is None else self._command
         soon = qd + solution.accelerations * s.period_s
         planned, rate = (self.clock.reference.sample(name, self.clock.time_s) for name in ("q", "qd"))
         hold = self._hold if self.stepped_at_s is None else 0.0
-        q = q + qd * (s.period_s / 2 + s.delay_s)  # drives pull towards the angles of the middle of the period
+        q = q + qd * (s.period_s / 2 + s.delay_s)  # in the middle of the period in which the command acts
         held, held_rate = q + hold * (planned - q), soon + s.damp * (self.clock.rate * rate - soon)
         return np.asarray(held + (solution.torques + self._damping * held_rate) / self._stiffness)
 
-    def _step_if_needed(self, data: Any, feet: Array) -> None:
+    def _step_if_needed(self, dcm: Array, feet: Array) -> None:
         """Begin a step from rest where the divergent component has left the soles (2, 3), and a foothold brings it back."""
         s, reference = self._settings, self.clock.reference
-        dcm = data.subtree_com[0, :2] + data.subtree_linvel[0, :2] / reference.rate
         nearest = clip_to_soles(dcm, feet[:, :2], reference.sample("yaw", self.clock.time_s), reference.soles)
         if np.linalg.norm(dcm - nearest) > s.step_beyond * reference.height:
             clocks = [StepClock(s, steps, feet) for steps in self._steps_from_rest]
@@ -330,7 +329,7 @@ class WholeBodyBalance:
                 self.clock = clocks[errors.index(min(errors))]
                 self.stepped_at_s = self.stepped_at_s or self._sampler.time_s
 
-    def _collect_targets(self, data: Any, feet: Array, weight: float) -> Targets:
+    def _collect_targets(self, data: Any, dcm: Array, feet: Array, weight: float) -> Targets:
         """Return the accelerations and loads that lead back to the plan."""
         s, clock = self._settings, self.clock
         reference = clock.reference
@@ -340,7 +339,6 @@ class WholeBodyBalance:
             return reference.sample(name, clock.time_s)
 
         com, velocity = data.subtree_com[0], data.subtree_linvel[0]
-        dcm = com[:2] + velocity[:2] / rate
         if clock.phase.swing is not None:
             clock.aim(dcm)
         dcm_offset, zmp_offset = clock.compute_offsets()
@@ -375,7 +373,7 @@ class WholeBodyBalance:
         )
 
     def _clip_to_support(self, zmp: Array, data: Any) -> Array:
-        """Return the nearest point (2,) of the support [m], which of a foot that rolls is the tip of its toe."""
+        """Return the nearest point (2,) of the support [m], a foot that rolls has the tip of its toe."""
         clock, reference, joints = self.clock, self.clock.reference, self._addresses
         standing, rolls = np.flatnonzero(clock.stands), np.array(clock.rolls)[:, None]
         places = np.where(rolls, data.site_xpos[joints.tips], data.site_xpos[joints.soles])[standing, :2]
@@ -392,21 +390,20 @@ class WholeBodyBalance:
         planned, soon = matrices.reshape(2, 3, 3)
         rate = to_rotation_vector(soon @ planned.T) / ahead * self.clock.rate
         error = to_rotation_vector(planned @ rotation.T)
-        turning, root = np.zeros((3, self._model.nv)), self._addresses.root
-        engine.mj_jacBody(self._model, data, None, turning, self._addresses.torso)
-        rate_error = rate - turning[:, root] @ data.qvel[root]
-        return _track(self._settings.torso_rate * self.clock.reference.rate, error, rate_error)
+        rate -= self._measure_velocity(data, engine.mjtObj.mjOBJ_XBODY, self._addresses.torso)[3:]
+        return _track(self._settings.torso_rate * self.clock.reference.rate, error, rate)
 
     def _move_foot(self, foot: int, data: Any, feet: Array) -> Array:
         """Return the acceleration (6,) of a sole: none where it touches the ground, else along the path to the new foothold.
 
-        That of a foot which rolls is of the tip of its toe, and turns as planned.
+        A foot that rolls keeps the tip of its toe in place and turns as planned.
         """
         clock, reference, joints = self.clock, self.clock.reference, self._addresses
         rate, rolls = self._settings.swing_rate * reference.rate, clock.rolls[foot]
-        velocity = self._measure_velocity(data, joints.soles[foot])
+        kind = self._engine.mjtObj.mjOBJ_SITE
+        velocity = self._measure_velocity(data, kind, joints.soles[foot])
         if rolls:
-            velocity[:3] = self._measure_velocity(data, joints.tips[foot])[:3]
+            velocity[:3] = self._measure_velocity(data, kind, joints.tips[foot])[:3]
         still = -2.0 * rate * velocity
         if clock.stands[foot] and not rolls:
             return still
@@ -432,10 +429,10 @@ class WholeBodyBalance:
         planned_rate[:2] += 6.0 * done * (1.0 - done) / span * moved
         return np.concatenate([_track(rate, place - feet[foot], clock.rate * planned_rate - velocity[:3]), turn])
 
-    def _measure_velocity(self, data: Any, site: int) -> Array:
-        """Return the velocity (6,) of a point of the robot, linear [m/s] and angular [rad/s]."""
+    def _measure_velocity(self, data: Any, kind: Any, number: int) -> Array:
+        """Return the velocity (6,) of a site or body, linear [m/s] and angular [rad/s], along the floor's axes."""
         velocity = np.zeros(6)
-        self._engine.mj_objectVelocity(self._model, data, self._engine.mjtObj.mjOBJ_SITE, site, velocity, 0)
+        self._engine.mj_objectVelocity(self._model, data, kind, number, velocity, 0)
         return np.roll(velocity, 3)
 
 

@@ -13,6 +13,8 @@ from nlp_gait.simulation.engine import Addresses, check_period, load_mujoco
 from nlp_gait.simulation.plan import SIDES, Plan
 from nlp_gait.simulation.sampler import Sampler
 
+TOGETHER_M = 1e-3  # feet of a planar robot nearer than this share the load equally
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Feedback:
@@ -156,9 +158,6 @@ class BalanceController:
         return attitude, posture.site_xpos[self._at.soles] - posture.xpos[self._at.torso]
 
 
-TOGETHER_M = 1e-3  # distance of feet that stand at one place in a plane
-
-
 def compute_load_shares(plan: Plan, times: Array, places: Array | None = None) -> Array:
     """Return the planned shares of the load on the left and right foot (T, 2): the ZMP between two that bear divides it.
 
@@ -168,9 +167,7 @@ def compute_load_shares(plan: Plan, times: Array, places: Array | None = None) -
     on_left, on_right = (plan.bears(side, times) for side in SIDES)
     apart = left - right
     ahead, squared = ((plan.at("zmp", times) - right) * apart).sum(axis=1), (apart**2).sum(axis=1)
-    between = np.divide(
-        ahead, squared, out=np.full(len(times), 0.5), where=squared > TOGETHER_M**2
-    )  # equal on feet at one place
+    between = np.divide(ahead, squared, out=np.full(len(times), 0.5), where=squared > TOGETHER_M**2)
     share = np.where(on_right == 0.0, 1.0, np.where(on_left == 0.0, 0.0, np.clip(between, 0.0, 1.0)))
     return np.stack([share, 1.0 - share], axis=1)
 

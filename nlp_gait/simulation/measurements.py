@@ -75,9 +75,8 @@ class Measurements:
     largest_tilt_deg: float  #: of the torso, settling included
     tracking_rms_rad: float  #: planned minus measured angle, over all joints
     tracking_max_rad: float  #: largest
-    slip_m: (
-        float  #: largest distance of a supporting sole from its place at the begin of its support, until a step at rest
-    )
+    #: largest distance of a supporting sole from its place at the begin of its support, until a step at rest
+    slip_m: float
     landings: Mapping[str, Landing]  #: by side, of the swinging feet
     #: distance of the centre of pressure, averaged over one set-point period, from the planned ZMP
     pressure_rms_m: float | None

@@ -11,10 +11,10 @@ V = TypeVar("V")
 
 
 class Sampler(Generic[V]):
-    """Takes the measurements of one simulation, whose noise is drawn from ``random``."""
+    """Measurements of one simulation; their noise is drawn from ``random``."""
 
     def __init__(self, period_s: float, delay_s: float, seed: int, step_s: float) -> None:
-        """Begin at a simulation's begin; ``step_s`` is that of the engine [s]."""
+        """Start with the simulation, whose time step is ``step_s`` [s]."""
         self.random = np.random.default_rng(seed)
         self._step_s, self._every, self._late = step_s, max(1, round(period_s / step_s)), round(delay_s / step_s)
         self._waiting: deque[tuple[int, V]] = deque()
@@ -26,7 +26,7 @@ class Sampler(Generic[V]):
         return self._steps * self._step_s
 
     def sample(self, measure: Callable[[], V]) -> V | None:
-        """Return the measurement that arrives at this step of the engine, None if there is none; call it once in each step."""
+        """Return the measurement that arrives at this time step, if any; call it once in every step."""
         if self._steps % self._every == 0:
             self._waiting.append((self._steps + self._late, measure()))
         arrived = bool(self._waiting) and self._waiting[0][0] <= self._steps

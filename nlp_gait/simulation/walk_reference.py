@@ -54,10 +54,9 @@ class WalkReference:
             np.stack([on(side, times) for side in SIDES], axis=1) > 0.5 for on in (plan.stands, plan.bears)
         )
         self.phases, rolls = _split(times, bears), bears & ~stands
-        places = np.where(
-            rolls.T[:, :, None], tips, np.stack([plan.at(f"{side}_foot", times)[:, :2] for side in SIDES])
-        )
-        feet = np.concatenate([plan.at(f"{side}_foot", times) for side in SIDES], axis=1)
+        left, right = (plan.at(f"{side}_foot", times) for side in SIDES)
+        places = np.where(rolls.T[:, :, None], tips, np.stack([left, right])[:, :, :2])
+        feet = np.hstack([left, right])
         yaw = np.stack([np.arctan2(*plan.direction(i, times).T[::-1]) for i in range(2)], axis=1)
         velocity = np.gradient(com, STEP_S, axis=0)
         velocity[[0, -1]] = 0.0
@@ -90,7 +89,7 @@ class WalkReference:
         self._store(arrays)
 
     def check_support(self) -> None:
-        """Raise InputError for a plan that leans on a toe in single support: its torque is no part of the balance."""
+        """Raise InputError for a plan whose ZMP is on a toe in single support: balance does not control the toe's torque."""
         for phase in self.phases:
             if self.plan.robot.toes and phase.swing is not None:
                 times = np.arange(phase.start_s, phase.end_s, STEP_S)
@@ -100,8 +99,8 @@ class WalkReference:
                 on_toe = (zmp[:, 0] - foot[:, 3 * (1 - phase.swing)]).max() - self.soles[1 - phase.swing, 0]
                 if on_toe > 0.0:
                     raise InputError(
-                        f"balance feedback keeps the ZMP of single support on the sole; this plan's is {1e3 * on_toe:.0f} mm "
-                        "ahead of it, on the toe; simulate the plan without feedback"
+                        "balance feedback needs the ZMP on the sole in single support; this plan's is "
+                        f"{1e3 * on_toe:.0f} mm ahead of it, on the toe; simulate it without feedback"
                     )
 
     def _store(self, arrays: dict[str, Array]) -> None:

@@ -1,6 +1,7 @@
 """Balance of the whole body: footholds in closed form, torques against the engine, and walks that open loop does not survive."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from nlp_gait.simulation.engine import Addresses, place_root  # noqa: E402
 from nlp_gait.simulation.mjcf import Bumps  # noqa: E402
 from nlp_gait.simulation.simulate import Conditions, Push, Run, prepare  # noqa: E402
 from nlp_gait.simulation.walk_reference import WalkReference  # noqa: E402
-from nlp_gait.simulation.whole_body import Targets, WholeBodyQP  # noqa: E402
+from nlp_gait.simulation.whole_body import Targets, Torques, WholeBodyQP  # noqa: E402
 
 LIMITS = StepLimits(
     rate=6.0,
@@ -71,75 +72,60 @@ def test_the_nearest_point_of_turned_soles_is_that_of_a_fine_grid() -> None:
         assert np.linalg.norm(both - point) <= np.linalg.norm(nearest - point) + 1e-12
 
 
-def test_torques_and_wrenches_give_the_accelerations_in_the_engine(plan: Plan) -> None:
-    model, data = prepare(plan, Conditions(), Drive(), "rectangle")
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-    addresses = Addresses(model, plan)
-    limits = np.array([plan.robot.joint(name).torque_limit_Nm for name in plan.joints])
-    qp = WholeBodyQP(WalkReference(plan, model, limits), model, addresses, limits, friction=0.5)
-    data.qvel[:] = np.random.default_rng(1).normal(0.0, 0.1, model.nv)
-    mujoco.mj_forward(model, data)
-    weight = plan.robot.mass_kg * plan.gravity
-    targets = Targets(
-        mass=np.array([0.2, -0.1, 0.3]),
-        torso=np.zeros(3),
-        feet=np.zeros((2, 6)),
-        stands=(True, True),
-        rolls=(False, False),
-        joints=np.zeros(len(limits)),
-        load_left=0.5,
-        most_load=(3.0 * weight, 3.0 * weight),
-    )
-    solution = qp.solve(data, targets)
-    assert solution is not None and (np.abs(solution.torques) <= limits).all()
-    data.qfrc_applied[:] = 0.0
-    data.qfrc_applied[addresses.rates] = solution.torques
-    for sole, wrench in zip(addresses.soles, solution.wrenches.reshape(2, 6), strict=True):
-        axes = data.site_xmat[sole].reshape(3, 3)
-        force, moment = axes @ wrench[:3], axes @ wrench[3:]
-        mujoco.mj_applyFT(model, data, force, moment, data.site_xpos[sole], model.site_bodyid[sole], data.qfrc_applied)
-    mujoco.mj_forward(model, data)
-    np.testing.assert_allclose(data.qacc[addresses.rates], solution.accelerations, rtol=1e-6, atol=1e-5)
-    forces = solution.wrenches.reshape(2, 6)[:, 2]
-    assert forces.sum() == pytest.approx(weight * (1.0 + 0.3 / plan.gravity), rel=0.05) and (forces > 0.0).all()
+def find_torque_limits(plan: Plan) -> Array:
+    return np.array([plan.robot.joint(name).torque_limit_Nm for name in plan.joints])
 
 
-def test_a_foot_that_rolls_is_held_at_the_tip_of_its_toe_where_no_moment_acts() -> None:
-    problem = nlp_gait.load("stairs-climb", stairs=2, intervals=10)
-    plan = make_plan(Result(problem=problem, x=problem.start_point(np.random.default_rng(0))))
+def solve_instant(plan: Plan, share: float, mass: tuple[float, float, float], left_rolls: bool) -> tuple[Torques, Any]:
+    """Return torques at a share of the plan's time and the engine's data; both have the same accelerations."""
     model, data = prepare(plan, Conditions(), Drive(), "rectangle")
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-    addresses = Addresses(model, plan)
-    limits = np.array([plan.robot.joint(name).torque_limit_Nm for name in plan.joints])
+    addresses, limits = Addresses(model, plan), find_torque_limits(plan)
     qp = WholeBodyQP(WalkReference(plan, model, limits), model, addresses, limits, friction=0.5)
-    time = np.array([0.3 * plan.duration_s])  # at the begin of the second step the left foot is behind
+    time = np.array([share * plan.duration_s])
     place_root(data.qpos, plan, plan.at("hip", time)[0], plan.attitude(time)[0])
     data.qpos[addresses.angles] = plan.at("q", time)[0]
     data.qvel[:] = np.random.default_rng(1).normal(0.0, 0.1, model.nv)
     mujoco.mj_forward(model, data)
     weight = plan.robot.mass_kg * plan.gravity
     targets = Targets(
-        mass=np.array([0.2, 0.0, 0.0]),
+        mass=np.array(mass),
         torso=np.zeros(3),
         feet=np.zeros((2, 6)),
         stands=(True, True),
-        rolls=(True, False),
+        rolls=(left_rolls, False),
         joints=np.zeros(len(limits)),
         load_left=0.5,
         most_load=(3.0 * weight, 3.0 * weight),
     )
     solution = qp.solve(data, targets)
-    assert solution is not None
-    rear, front = solution.wrenches.reshape(2, 6)
-    assert rear[2] > 0.1 * weight and (rear[3:] == 0.0).all()
-    tip, flat = addresses.tips[0], addresses.soles[1]
+    assert solution is not None and (np.abs(solution.torques) <= limits).all()
     data.qfrc_applied[addresses.rates] = solution.torques
-    for site, wrench, axes in ((tip, rear, np.eye(3)), (flat, front, data.site_xmat[flat].reshape(3, 3))):
-        force, moment = axes @ wrench[:3], axes @ wrench[3:]
+    sites, axes = addresses.soles.copy(), data.site_xmat[addresses.soles].reshape(2, 3, 3)
+    if left_rolls:
+        sites[0], axes[0] = addresses.tips[0], np.eye(3)
+    for site, turn, wrench in zip(sites, axes, solution.wrenches.reshape(2, 6), strict=True):
+        force, moment = turn @ wrench[:3], turn @ wrench[3:]
         mujoco.mj_applyFT(model, data, force, moment, data.site_xpos[site], model.site_bodyid[site], data.qfrc_applied)
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(data.qacc[addresses.rates], solution.accelerations, rtol=1e-6, atol=1e-5)
-    rows, drift = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    return solution, data
+
+
+def test_torques_and_wrenches_give_the_accelerations_in_the_engine(plan: Plan) -> None:
+    solution, _ = solve_instant(plan, 0.0, (0.2, -0.1, 0.3), left_rolls=False)
+    forces, weight = solution.wrenches.reshape(2, 6)[:, 2], plan.robot.mass_kg * plan.gravity
+    assert forces.sum() == pytest.approx(weight * (1.0 + 0.3 / plan.gravity), rel=0.05) and (forces > 0.0).all()
+
+
+def test_a_foot_that_rolls_is_held_at_the_tip_of_its_toe_where_no_moment_acts() -> None:
+    problem = nlp_gait.load("stairs-climb", stairs=2, intervals=10)
+    plan = make_plan(Result(problem=problem, x=problem.start_point(np.random.default_rng(0))))
+    # At the begin of the second step the left foot is behind.
+    solution, data = solve_instant(plan, 0.3, (0.2, 0.0, 0.0), left_rolls=True)
+    assert solution.wrenches[2] > 0.1 * plan.robot.mass_kg * plan.gravity and (solution.wrenches[3:6] == 0.0).all()
+    model = data.model
+    tip, rows, drift = model.site("left tip").id, np.zeros((3, model.nv)), np.zeros((3, model.nv))
     mujoco.mj_jacSite(model, data, rows, None, tip)
     mujoco.mj_jacDot(model, data, drift, None, data.site_xpos[tip], model.site_bodyid[tip])
     np.testing.assert_allclose(rows @ data.qacc + drift @ data.qvel, 0.0, atol=0.05)  # a weighted task
@@ -148,7 +134,7 @@ def test_a_foot_that_rolls_is_held_at_the_tip_of_its_toe_where_no_moment_acts() 
 @pytest.mark.slow
 def test_a_wrench_is_allowed_just_where_forces_at_the_corners_of_a_sole_give_it(plan: Plan) -> None:
     model, _ = prepare(plan, Conditions(), Drive(), "rectangle")
-    limits = np.array([plan.robot.joint(name).torque_limit_Nm for name in plan.joints])
+    limits = find_torque_limits(plan)
     reference, friction = WalkReference(plan, model, limits), 0.5
     rows = WholeBodyQP(reference, model, Addresses(model, plan), limits, friction).cone
     random, side = np.random.default_rng(0), friction / np.sqrt(2.0)
@@ -181,9 +167,7 @@ def standing(plan: Plan) -> Plan:
 @pytest.mark.parametrize("first", [0, 1])
 def test_steps_from_rest_move_the_mass_as_a_pendulum_and_end_where_they_begin(standing: Plan, first: int) -> None:
     model, _ = prepare(standing, Conditions(), Drive(), "rectangle")
-    reference = WalkReference(
-        standing, model, np.array([standing.robot.joint(n).torque_limit_Nm for n in standing.joints])
-    )
+    reference = WalkReference(standing, model, find_torque_limits(standing))
     steps = reference.make_steps_from_rest(first)
     assert [phase.swing for phase in steps.phases] == [None, first, None, 1 - first, None]
     swing, feet = steps.phases[1], steps.sample("feet", 0.0).reshape(2, 3)

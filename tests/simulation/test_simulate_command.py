@@ -108,7 +108,7 @@ def climb_on_bumps(plan: Plan) -> None:
 
 def test_balance_refuses_a_plan_that_leans_on_its_toe() -> None:
     plan = make_plan(Result(problem=(problem := nlp_gait.load("stairs-plan")), x=problem.check_x(FREE)))
-    with pytest.raises(InputError, match="keeps the ZMP of single support on the sole; this plan's is .* on the toe"):
+    with pytest.raises(InputError, match="needs the ZMP on the sole in single support; this plan's is .* on the toe"):
         simulate_plan(plan, drive=Drive(balance=Balance()))
 
 
