@@ -34,8 +34,6 @@ PANELS = {
         "prices": ("questions:prices", "What each limit and each error of the robot costs."),
         "pareto": ("questions:pareto", "Power against stability or speed."),
         "certainty": ("questions:certainty", "Is the best known optimum the global one?"),
-        "variants": ("questions:variants", "What changes with motors, motions or options."),
-        "robust": ("questions:robust", "One gait for all masses and soles within tolerances."),
     },
     "Show and share": {
         "simulate": ("simulate:simulate", "Simulate a gait in MuJoCo."),
@@ -51,8 +49,6 @@ REPLACEMENTS = {
     "export-objective": "export --to objective writes it",
     "export-solver": "export --to solver writes it",
     "logs": "report FOLDER --logs writes the runs as logs for iohinspector",
-    "motions": "variants compares motions",
-    "motors": "variants compares motors",
     "search": "compare PROBLEM --algorithms pso --starts 0 --runs 1 runs a search",
     "walk": "sweep --engine simulates the cheapest cycle at each speed",
 }

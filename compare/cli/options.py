@@ -122,13 +122,6 @@ class AnyProblem(ProblemOptions):
         return self.make_spec(self.name)
 
 
-@dataclass(frozen=True, kw_only=True)
-class NaoPhase(NamedProblem):
-    """A problem, by default nao-ssp."""
-
-    name: ProblemName = "nao-ssp"
-
-
 def name_all(code: Sequence[str] | None) -> None:
     """Allow files of data to use this code of the user; raises InputError for a text that is not a reference."""
     for text in code or ():

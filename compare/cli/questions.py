@@ -1,6 +1,5 @@
 """Commands that answer a question about a problem: how certain its optimum is, and how it changes."""
 
-from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,16 +13,13 @@ from compare.questions.certainty import Certainty, search_point
 from compare.questions.pareto.pareto import Pareto, parse_searches
 from compare.questions.prices import Prices
 from compare.questions.question import Question, Work
-from compare.questions.robust import Robust
 from compare.questions.sweep import Sweep, parse_axis
-from compare.questions.variants import MOTORS, PROBLEM, Variant, Variants, list_trajectories
 from compare.report.document import Table, iterate_leaves
 from compare.report.writing import add_session
 from compare.study.store import Store
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError, OutputError
 from nlp_gait.files import make_writable_folder
-from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.biped.cycle import SPEED
 from nlp_gait.interrupts import defer_interrupts
 from nlp_gait.proofs.certificate import check_certificate, load_certified_problem, read_certificate, repeat_proof
@@ -33,8 +29,6 @@ CYCLES = ("nao-cycle", "humanoid-cycle")  # whose speed is a parameter if the ob
 PROOF = "Of the proof [s], for at most four variables and NAO's phases; 0 for none."
 CHECK = "Certificate to check instead: look for a better point, then repeat paths of its proof."
 COMPLETE = "With --check: also repeat the whole proof; rerun to continue."
-OVER = "Real motors, feature by feature; richer and richer motions with free joints at the end; or values of an option."
-VARIANT = "A variant by name, next to the problem itself; `problem` is another problem's name; repeatable."
 SEARCHES = "NSGA2 or CMOPSO; repeatable. 'none' for no search."
 ENGINE = "Simulate steps of each walking cycle in MuJoCo (extra sim)."
 
@@ -93,59 +87,6 @@ def _check(path: Path, seed: int, repeat_in: Path | None) -> Output:
 
 
 @command
-def variants(
-    *,
-    over: Annotated[str | None, Option(metavar="motors|trajectory|OPTION=V1,V2,...", help=OVER)] = None,
-    variant: Annotated[list[str] | None, Option(metavar="NAME:OPTION=VALUE,...", help=VARIANT)] = None,
-    starts: options.Starts = 10,
-    seed: options.Seed = 0,
-    problem: options.NaoPhase,
-    out: options.OutFolder = options.RESULTS,
-) -> Output:
-    """Solve variants of a problem, each from the richest earlier one that it contains, and show what changes.
-
-    Free joints take minutes each. Rerun the command to continue after an interruption.
-
-    Examples: `nlp-gait variants nao-ssp --over motors`, `nlp-gait variants nao-dsp --over trajectory --starts 2`,
-    `nlp-gait variants nao-ssp --variant "smooth:objective=jerk" --variant "quick motors:motors=limits,rotor"`
-    """
-    base = problem.load()
-    return run_question(
-        Variants(problem=base, variants=_list_variants(base, over, variant), starts=starts, seed=seed), out
-    )
-
-
-def _list_variants(problem: GaitProblem, over: str | None, named: Sequence[str] | None) -> list[Variant]:
-    """Return the variants that ``--over`` and ``--variant`` describe."""
-    option, _, values = (over or "").partition("=")
-    if over is None:
-        variants = [Variant(name="as given")]
-    elif values:
-        variants = [
-            Variant(name=value, options=options.parse_options(problem.address, [(option, value)]))
-            for value in options.parse_names(values)
-        ]
-    elif option in ("motors", "trajectory"):
-        variants = [*(MOTORS if option == "motors" else list_trajectories(problem))]
-    else:
-        raise InputError(f"--over takes motors, trajectory or OPTION=VALUE,VALUE,..., got {over!r}")
-    for text in named or ():
-        name, _, changes = text.partition(":")
-        pairs: list[str] = []
-        for piece in changes.split(","):  # a value may contain commas
-            pairs = [*pairs, piece] if "=" in piece else [*pairs[:-1], f"{pairs[-1]},{piece}" if pairs else piece]
-        given = dict(options.parse_pairs(pairs, "--variant NAME:"))
-        other_problem = given.pop(PROBLEM, "")
-        changed = options.parse_options(other_problem or problem.address, given.items())
-        variants.append(Variant(name=name.strip(), options=changed, problem=other_problem))
-    if len(variants) < 2:
-        raise InputError(
-            "name at least two variants by --over or --variant; the problem itself is one of those of --variant"
-        )
-    return variants
-
-
-@command
 def pareto(
     *,
     against: Annotated[str, Option(help="dbm_y_mean or dbm_x_mean [m], or speed [m/s].")] = "dbm_y_mean",
@@ -179,25 +120,6 @@ def prices(
     Derivatives of optimum and x* by the first-order conditions, verified by solving again. Example: `nlp-gait prices nao-ssp`
     """
     return run_question(Prices(problem=problem.load(), starts=starts, seed=seed, checks=checks), out)
-
-
-@command
-def robust(
-    *,
-    mass: Annotated[float, Option(min=0.0, max=50.0, help="Tolerance of every mass, up and down [%].")] = 5.0,
-    sole: Annotated[float, Option(min=0.0, max=20.0, help="Tolerance of the soles' position in x and y [mm].")] = 2.0,
-    starts: options.Starts = 10,
-    seed: options.Seed = 0,
-    problem: options.NaoPhase,
-    out: options.OutFolder = options.RESULTS,
-) -> Output:
-    """Find the least power of a gait that keeps its limits for all masses and soles within their tolerances.
-
-    One motion for all robots of a box, whose worst corners are found one after the other. Both gaits are written for each corner,
-    for `nlp-gait simulate`. Example: `nlp-gait robust nao-ssp`
-    """
-    effort = {"starts": starts, "seed": seed}
-    return run_question(Robust(problem=problem.load(), mass=mass, sole=sole, **effort), out)
 
 
 @command
@@ -259,7 +181,6 @@ def run_question(question: Question[Any], out: Path) -> Output:
             failures.append(str(error))
     if pressed() and not stopped:
         stopped = "interrupted at the end"
-    failures += filter(None, ["; ".join(question.failures(findings))])
     parts: list[str | Rows] = [answer.title, *answer.headline]
     for block in iterate_leaves(answer.parts):
         if isinstance(block, str):

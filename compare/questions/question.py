@@ -98,10 +98,6 @@ class Question(ABC, Generic[F]):
         data = {**answer.data, **reference.to_json()}
         return replace(answer, headline=(*answer.headline, f"{sentence}."), data=data)
 
-    def failures(self, findings: F) -> list[str]:
-        """Return what failed, which ends the command with status 1."""
-        return []
-
 
 def find(question: Question[F], work: Work | None = None) -> F:
     """Return the complete findings of a question; raises as ``Question.find``."""
@@ -155,9 +151,3 @@ def _flatten(value: Any, path: str = "") -> Iterator[tuple[str, Value]]:
         return
     for key, entry in value.items():
         yield from _flatten(entry, f"{path}.{key}" if path else str(key))
-
-
-def make_optima_table(optima: Mapping[str, Mapping[str, float]]) -> Table:
-    """Return a table of optima, given as x by variable name under their headings, with a row for each variable."""
-    rows = [(name, *(f"{x[name]:.5g}" for x in optima.values())) for name in next(iter(optima.values()))]
-    return make_text_table(("variable", *optima), rows, "Optima")

@@ -20,7 +20,7 @@ import nlp_gait
 from compare.cli import app, questions
 from compare.papers import load_reproduction
 from compare.papers.paper_runs import Effort, Runner
-from compare.questions import robust_gait, sweep, variants
+from compare.questions import sweep
 from compare.study.record import read_record
 from compare.study.store import Computation
 from nlp_gait.backends.solvers.solver import IterationWatch
@@ -30,7 +30,7 @@ from nlp_gait.interrupts import (
 from tests.faults.processes import ROOT, start, wait_for
 
 SWEEP = "sweep walk12 --over step_length_m=0.05:0.12:30 --starts 1"
-LIFTS, MOTORS = "sweep walk12 --over foot_lift_m=0.01,0.02 --starts 1", "variants --over motors --starts 1"
+LIFTS = "sweep walk12 --over foot_lift_m=0.01,0.02 --starts 1"
 
 
 def press_after(monkeypatch: pytest.MonkeyPatch, owner: object, name: str, calls: int) -> None:
@@ -91,9 +91,7 @@ NOTHING = r"; (\d) finished results are stored in .*"
     [
         (IterationWatch, "eval", 60, SWEEP, rf"after (\d+) of 30 points, not all.*{KEPT}", "step_length_m-ipopt"),
         (questions, "add_session", 1, LIFTS, "at the end" + KEPT, "foot_lift_m-ipopt"),
-        (variants, "solve", 2, MOTORS + " --set intervals=3", r"after (1) of 8 variants" + KEPT, "variants"),
         (sweep, "solve_both_ways", 1, LIFTS, "after 0 of 4 solves" + NOTHING, ""),
-        (robust_gait, "solve", 1, "robust", NOTHING, ""),
     ],
 )
 @pytest.mark.usefixtures("coarse_pictures")

@@ -79,13 +79,6 @@ REFUSED = {
     "verify {new}/missing.zip": "missing.zip' cannot be read: No such file",
     "prices nao-spp --out {new}": "unknown problem 'nao-spp'",
     "certainty nao-spp --out {new}": "unknown problem 'nao-spp'",
-    "robust walk12 --out {new}": "problem 'walk12' has no robot that could be uncertain",
-    "variants walk12 --over motors --out {new}": "unknown option of walk12 'motors'",
-    "variants nao-ssp --over speed --out {new}": "--over takes motors, trajectory or OPTION",
-    "variants nao-ssp --out {new}": "name at least two variants",
-    "variants nao-ssp --variant fast:speed --out {new}": "--variant NAME: takes NAME=VALUE",
-    "variants nao-ssp --variant fast:speed=3 --out {new}": "unknown option of nao-ssp 'speed'",
-    "variants nao-ssp --variant a:motors=limits --variant a:motors=limits --out {new}": "each with its own name",
 }
 
 

@@ -17,24 +17,17 @@ from compare.questions.certainty import Certainty
 from compare.questions.pareto.pareto import Pareto
 from compare.questions.prices import Prices
 from compare.questions.question import Answer, Question, Work, find
-from compare.questions.robust import Robust
 from compare.questions.sweep import Sweep, parse_axis
-from compare.questions.variants import Variant, Variants
 from compare.report.document import Table
 from compare.study.store import Store
 from nlp_gait import load
 from nlp_gait.files import replace_nan
-from nlp_gait.formulation import GaitProblem
 from tests.compare.cli.calls import as_json, nlp_gait
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 TIMES = ("time_s", "cpu_s", "run_time_s", "files")
 ARM = {"swing_height_m": 0.015, "hip_height_m": 0.31, "hip_vx_start_m_s": 0.0124, "hip_vx_end_m_s": 0.001}
-
-
-def load_small() -> GaitProblem:
-    return load("nao-ssp", intervals=2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,15 +44,6 @@ CASES = {
         make=lambda: Sweep(problem=load("walk12"), starts=1, axes=[parse_axis("step_length_m=0.08,0.1")]),
         rows="points",
         line="sweep walk12 --over step_length_m=0.08,0.1 --starts 1",
-    ),
-    "variants": Case(
-        make=lambda: Variants(
-            problem=load_small(),
-            starts=1,
-            variants=[Variant(name="as given"), Variant(name="limits", options={"motors": "limits"})],
-        ),
-        rows="variants",
-        line="variants nao-ssp --set intervals=2 --starts 1 --variant limits:motors=limits",
     ),
     "certainty": Case(
         make=lambda: Certainty(problem=load("walk12"), starts=4, time_limit_s=0.0),
@@ -80,7 +64,6 @@ CASES = {
         line="pareto nao-ssp --set intervals=4 --points 5 --starts 1 --search NSGA2=100 --runs 1 "
         + " ".join(f"--set {name}={value}" for name, value in ARM.items()),
     ),
-    "robust": Case(make=lambda: Robust(problem=load_small(), mass=0.0, starts=1, samples=1), rows="boxes"),
 }
 each_question = pytest.mark.parametrize("name", CASES)
 
