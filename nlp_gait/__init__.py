@@ -52,8 +52,6 @@ PROBLEMS |= {
     "nao-ssp": "nlp_gait.gaits.nao.problems:nao_ssp",
     "nao-dsp": "nlp_gait.gaits.nao.problems:nao_dsp",
     "nao-walk": "nlp_gait.gaits.nao.walking:nao_walk",
-    "nao-ssp-free": "nlp_gait.gaits.nao.free_joints:nao_ssp_free",
-    "nao-dsp-free": "nlp_gait.gaits.nao.free_joints:nao_dsp_free",
     "nao-cycle": "nlp_gait.gaits.nao.walking:nao_cycle",
     "humanoid-ssp": "nlp_gait.gaits.humanoid.problems:humanoid_ssp",
     "humanoid-dsp": "nlp_gait.gaits.humanoid.problems:humanoid_dsp",

@@ -50,8 +50,6 @@ def problems() -> Callable[[str], GaitProblem]:
         "nao-ssp",
         "nao-dsp",
         "nao-cycle",
-        "nao-ssp-free",
-        "nao-dsp-free",
         "humanoid-ssp",
         "humanoid-dsp",
         pytest.param("nao-walk", marks=pytest.mark.slow),

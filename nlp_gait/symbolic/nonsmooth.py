@@ -98,10 +98,6 @@ class Nonsmooth:
         """Return ``below`` where switch < 0, else ``above``, elementwise; without a branch so that it vectorises."""
         return below + (switch >= 0) * (above - below)
 
-    def tie(self, v: MX) -> MX:
-        """Return the vector v (m, 1), as a separate variable if that saves a solver from differentiating through it."""
-        return v
-
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
         """Return the states (n, N) after each of N steps, made one after the other in a loop at run time.
 
@@ -192,10 +188,6 @@ class Lifted(Nonsmooth):
         self.smoothed = True
         share = 0.5 * (1 + ca.tanh(switch / (2 * self.width)))
         return below + share * (above - below)
-
-    def tie(self, v: MX) -> MX:
-        """Return a variable that an equation ties to v."""
-        return self._lift("tied", v, lambda tied: tied - v, tight=True)
 
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
         """Use multiple shooting: all states are variables, tied by one equation for each step."""

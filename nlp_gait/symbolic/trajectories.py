@@ -6,7 +6,6 @@ degree five with these ends; zero coefficients leave the cubic.
 """
 
 from collections.abc import Callable, Sequence
-from functools import cache
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -58,31 +57,6 @@ def basis(spans: int, phase: SX, order: int) -> SX:
         step = _raise_degree if degree <= DEGREE - order else _differentiate
         values = step(values, knots, degree, phase)
     return ca.vertcat(*values[FIXED : len(values) - FIXED])
-
-
-def refine_spline(coefficients: Array, spans: int) -> Array:
-    """Return the coefficients (m,) of a curve, or (m, k) of k curves, with more spans, a multiple of theirs."""
-    m = coefficients.shape[0]
-    if m == 0:
-        return np.zeros((count_coefficients(spans), *coefficients.shape[1:]))
-    phases = np.linspace(0.0, 1.0, 4 * (spans + DEGREE))
-    return fit_spline(tabulate_basis(m - 1, phases).T @ coefficients, spans, phases)
-
-
-def fit_spline(values: Array, spans: int, phases: Array) -> Array:
-    """Return (m, k) coefficients of the least-squares fit to values (n, k) at phases (n,)."""
-    return np.asarray(np.linalg.lstsq(tabulate_basis(spans, phases).T, values, rcond=None)[0], dtype=float)
-
-
-def tabulate_basis(spans: int, phases: Array, order: int = 0) -> Array:
-    """Return (m, n) derivatives of the basis functions at phases (n,)."""
-    return np.array(_basis_function(spans, order).map(len(phases))(phases[None, :]).full())
-
-
-@cache
-def _basis_function(spans: int, order: int) -> ca.Function:
-    phase = SX.sym("phase")
-    return ca.Function("basis", [phase], [basis(spans, phase, order)])
 
 
 def _raise_degree(values: list[SX], knots: Array, degree: int, phase: SX) -> list[SX]:

@@ -22,8 +22,6 @@ TRANSCRIBED = {
     "stairs-climb": "three such steps",
     "nao-walk": "five pairs of states tied by seven phases: planned from a walk of NAO, no random candidate is feasible",
     "humanoid-walk": "likewise",
-    "nao-ssp-free": "splines on every joint: to move one coefficient alone tilts the standing robot's other foot into the ground",
-    "nao-dsp-free": "the legs' loop is closed by Newton's method, which ends nowhere for a torso far from upright",
 }
 SEARCHABLE = [name for name in PROBLEMS if name not in TRANSCRIBED]
 # A start of the others takes seconds; the tests of stairs, humanoids and walking solve them.

@@ -14,5 +14,5 @@ From a robot to the first constraint, in reading order:
 
 ``support_phases.py`` composes a phase, ``cycle.py`` joins both by the switches of ``switch.py``, ``walk.py`` and
 ``footstep_walk.py`` more phases; ``phase_problem.py`` makes the problem. ``problems.py`` and ``walking.py`` declare the options.
-``nao/joint_phase.py`` is a phase whose joints' motion is given, free or recorded.
+``nao/recorded_phase.py`` is a phase whose joints' motion is recorded.
 """

@@ -2,16 +2,15 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import Any
+from functools import partial
 
 import casadi as ca
 import numpy as np
-from casadi import DM, MX
+from casadi import MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Constraint, GaitProblem, Grid, Parameter, Point, Signals, SolverHints, load
-from nlp_gait.formulation.assembly import NumericPoint, RowsOverTime, Variable
+from nlp_gait.formulation import Constraint, GaitProblem, Grid, Parameter, Point, SolverHints, load
+from nlp_gait.formulation.assembly import Variable
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Support
@@ -22,56 +21,15 @@ from nlp_gait.gaits.biped.limits import BalanceMargins, Limit, RowsAndIndexes, m
 from nlp_gait.gaits.biped.loads import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase, make_phase_problem
-from nlp_gait.gaits.biped.samples import CORNERS, LEAST_DURATION, Samples
+from nlp_gait.gaits.biped.samples import CORNERS, Samples
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
 from nlp_gait.gaits.biped.switch import SWITCHES
 from nlp_gait.gaits.nao.body import make_nao
-from nlp_gait.gaits.nao.joint_phase import JointPhase
 from nlp_gait.gaits.nao.recorded_motion import FINE, RecordedMotion, make_places_function, read_motion
+from nlp_gait.gaits.nao.recorded_phase import GROUND_TOLERANCE, RecordedPhase
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-MOVES = 1e-9  # [rad]; a joint that turns by less is held
 GAITS = ("nao-ssp", "nao-dsp", "nao-cycle")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RecordedPhase(JointPhase):
-    """A phase whose angles over time are given, stretched to its duration."""
-
-    recorded: RecordedMotion  # the motion, of the same joints
-
-    @cached_property
-    def moving(self) -> tuple[str, ...]:
-        """Joints whose angle changes over the phase."""
-        turned = np.ptp(self.recorded.q, axis=0)
-        return tuple(name for name, range_rad in zip(self.body.joints, turned, strict=True) if range_rad > MOVES)
-
-    def move(self, point: Any, ops: Nonsmooth, phases: MX | None = None) -> Any:
-        times = np.linspace(0.0, self.recorded.duration_s, self.grid.parts + 1)
-        speed = self.recorded.duration_s / ca.fmax(point[self.duration], LEAST_DURATION)
-        q, qd, qdd = (DM(self.recorded.spline(times, order).T) for order in range(3))
-        return ca.vertcat(q, qd * speed, qdd * speed**2)
-
-    def rows_over_time(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[RowsOverTime, ...]:
-        """Return nothing: a recording says nothing about the time between its samples."""
-        return ()
-
-    def signals(self, point: NumericPoint) -> Signals:
-        """Return time histories at a point of numbers; a sole within the tolerance from the ground is on it."""
-        signals = super().signals(point)
-        heights = signals.arrays["right_foot"][:, 2]
-        heights[np.abs(heights) < GROUND_TOLERANCE.default] = 0.0
-        return signals
-
-
-# Largest distance of a recorded sole from its place: rounding, and the spline between samples.
-GROUND_TOLERANCE = Parameter(
-    name="ground_tolerance_m",
-    unit="m",
-    default=5e-4,
-    description="a sole nearer than this to the ground and to its place stands",
-    minimum=0.0,
-)
 
 
 class HipLimits(Limit):
@@ -197,9 +155,6 @@ def make_recorded_phase(
         variables=variables,
         duration=TIMES[kind],
         grid=grid,
-        support=body.support,
-        curves={name: (name,) for name in body.joints},
-        held={},
         recorded=motion,
     )
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -14,8 +15,10 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import Body, Support
-from nlp_gait.gaits.nao.joint_phase import locate_free_parts
 from nlp_gait.gaits.nao.joints import JOINTS, RESTING_ARM_ANGLES
+from nlp_gait.robots import Robot
+from nlp_gait.robots.tree import make_tree
+from nlp_gait.symbolic.kinematics import forward_kinematics
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -106,6 +109,37 @@ class RecordedMotion:
         near, far = np.sqrt(distance[[last, before]])
         late = 0.0 if far <= near else near * (self.t[last] - self.t[before]) / (far - near)
         return float(self.t[np.argmin(np.abs(self.t - (self.t[last] + late)))])
+
+
+class FreeParts(NamedTuple):
+    """Places of what does not stand."""
+
+    torso: SX  # (3,) origin of the torso [m]
+    ankle: SX  # (3,) of the right foot [m]
+    corners: SX  # (3, 4) of the right sole [m]
+    rotation: SX  # (3, 3) from the torso's axes
+
+
+def locate_free_parts(robot: Robot, q: Mapping[str, SX], support: tuple[float, float, float]) -> FreeParts:
+    """Return the places of torso and right foot of a robot with its left ankle at ``support`` [m], from joint angles [rad]."""
+    tree = make_tree(robot, robot.feet["left"].link)
+    poses = forward_kinematics(tree, q, SX(DM(support)))
+    by_link = {body.link.name: pose for body, pose in zip(tree, poses, strict=True)}
+    torso, foot = by_link[robot.root], robot.feet["right"]
+    entry = next(body.joint for body in tree if body.link.name == robot.root)
+    assert entry is not None  # the torso is not the fixed link; for the type checker
+    ankle = by_link[foot.link]
+    corners = [
+        (along, across, -foot.ankle_height_m)
+        for along in (-foot.back_m, foot.front_m)
+        for across in (-foot.right_m, foot.left_m)
+    ]
+    return FreeParts(
+        torso.position - torso.rotation @ DM(entry.origin_m),
+        ankle.position,
+        ca.repmat(ankle.position, 1, 4) + ankle.rotation @ DM(np.array(corners).T),
+        torso.rotation,
+    )
 
 
 @lru_cache(maxsize=8)
