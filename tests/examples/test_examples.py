@@ -18,9 +18,7 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from compare.study.run_study import Study, check_study
-from compare.study.run_task import run_task
 from compare.study.settings import read_settings
-from compare.study.task import ProblemSpec, Stop, Task
 
 ROOT = Path(__file__).parents[2]
 MOST_LINES = 60  # of code
@@ -50,7 +48,7 @@ FEWER = {
 # Run by the gallery alone: they print no number, or those of a sweep, a study and a simulation, which tests of these check.
 GALLERY_ALONE = ("sweep.py", "front.py", "physics_engine.py", "notebook.py", "slider.py", "cluster.py")
 # Three kinds at once, for the page of that name, and a command; not in the gallery.
-WITHOUT_FIGURE = {"bring_your_own.py", "read_last_release.py"}
+WITHOUT_FIGURE = {"bring_your_own.py"}
 
 
 def test_no_example_is_forgotten() -> None:
@@ -111,22 +109,3 @@ def test_the_study_file_can_run() -> None:
     study = Study(tasks=settings.tasks())
     check_study(study)
     assert len(study.tasks) == 2 * (31 + 31 + 2 * 31 + 31 + 11)
-
-
-@pytest.mark.slow
-def test_records_of_the_last_release_are_converted() -> None:
-    """A run, one that polishes a search, and one of a problem that has lost an option."""
-    convert = runpy.run_path(str(ROOT / "examples" / "read_last_release.py"))["convert"]
-    search = {"handling": {"name": "deb", "settings": {}}}
-    for name, polish in (("walk12", False), ("walk12", True), ("nao-dsp", False)):
-        task = Task(problem=ProblemSpec(name=name), solver="random", stop=Stop(evaluations=60), polish=polish)
-        raw = run_task(task).to_json()
-        inputs, origin = raw.pop("inputs"), raw["origin"]
-        old = {key: inputs[key] for key in ("problem", "objective", "settings", "seed")}
-        if name == "nao-dsp":
-            old["problem"]["options"]["load_degree"] = 4
-        stop = {"evaluations": 60, "target": None, "stagnation": None, "time_limit_s": None}
-        old |= {"solver": "ipopt", "polishes": {"solver": "random", "stop": stop, **search}} if polish else search
-        old |= {} if polish else {"solver": "random", "stop": stop}
-        origin["code_sha256"] = inputs["code"]
-        assert convert({**raw, "definition": old, "seed": 0}).inputs.key == task.inputs().key
