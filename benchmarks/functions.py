@@ -19,7 +19,7 @@ import numpy as np
 
 import nlp_gait
 from benchmarks.casadi_code import compiled_functions
-from benchmarks.rows import Array, Row, ratio, side_by_side
+from benchmarks.rows import Array, Row, ratio, scale_to_lanes, side_by_side
 from nlp_gait.backends.kernel.compiler import native_lanes
 
 BATCH, SHARE = 4096, 16  # CasADi's paths get a share of the batch
@@ -38,7 +38,7 @@ PATHS = {
     "numpy": "NumPy",
     "jax": "JAX",
 }
-REQUIRED = {"machine": 25, "c": 10}
+REQUIRED = {"machine": 25, "c": 10}  # with eight lanes
 
 
 class PlainFunction(NamedTuple):
@@ -204,7 +204,7 @@ def rows(rounds: int) -> list[Row]:
                 name=f"{plain.name} against {PATHS[path]}",
                 value=value,
                 unit="x",
-                required=REQUIRED.get(path),
+                required=scale_to_lanes(REQUIRED[path]) if path in REQUIRED else None,
                 note=note,
             )
             for path, value in ratios.items()

@@ -22,9 +22,9 @@ from nlp_gait.backends.kernel.compiled import SHARED, NativeRows
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
 from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel, write_rows_source
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.nao.body import GRAVITY, make_nao
+from nlp_gait.gaits.biped.body import Body
+from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
-from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.tape import simplify
@@ -74,7 +74,6 @@ def paths(rounds: int) -> list[Row]:
             value=ratio(times["machine"], times["kernel"], share),
             unit="x",
             required=50,
-            ambition=70,
         ),
         Row(
             name="against CasADi's C code, external with map",
@@ -88,7 +87,6 @@ def paths(rounds: int) -> list[Row]:
             value=ratio(times["by hand"], times["kernel"], share),
             unit="x",
             required=100,
-            ambition=200,
             note="pin.rnea sample by sample, the rest vectorised over samples",
         ),
     ]
@@ -104,25 +102,26 @@ def _with_violation(kernel: Kernel, problem: GaitProblem) -> Function:
 def torques(rounds: int) -> list[Row]:
     """Inverse dynamics alone, samples one by one: every joint free, and as the gait moves them."""
     body = make_nao("nao-v5")
-    robot = body.robot
     moving = [name for name in JOINTS if name in PLANNED_JOINTS or name in ARM_SWING]
-    free = _torques(rounds, robot, JOINTS, ())
-    gait = _torques(rounds, robot, moving, body.upright)
+    free = _torques(rounds, body, JOINTS, ())
+    gait = _torques(rounds, body, moving, body.upright)
     return [
-        Row(name="torques alone, against pin.rneaInParallel(1)", unit="x", required=12, ambition=25, **gait),
+        Row(name="torques alone, against pin.rneaInParallel(1)", unit="x", required=12, **gait),
         Row(name="torques alone, all 22 joints free", unit="x", **free),
     ]
 
 
-def _torques(rounds: int, robot: Robot, moving: Sequence[str], upright: Collection[str]) -> dict[str, Any]:
+def _torques(rounds: int, body: Body, moving: Sequence[str], upright: Collection[str]) -> dict[str, Any]:
     """Ratio and note: kernel of the torques of all joints from the state of those that move, against Pinocchio."""
-    count, n = 11 * BATCH, len(moving)
+    count, n, robot = 11 * BATCH, len(moving), body.robot
     state = SX.sym("state", 3 * n)
     parts = [dict(zip(moving, part.elements(), strict=True)) for part in vertsplit(state, n)]
     held = {name: SX(HELD_ARM_ANGLES.get(name, 0.0)) for name in JOINTS}
     still = dict.fromkeys(JOINTS, SX(0))
     tree = make_tree(robot, robot.feet["left"].link)
-    torque, _ = newton_euler(tree, held | parts[0], still | parts[1], still | parts[2], GRAVITY, upright=upright)
+    torque, _ = newton_euler(
+        tree, held | parts[0], still | parts[1], still | parts[2], body.gravity_vector, upright=upright
+    )
     outputs = simplify([vertcat(*(torque[name] for name in JOINTS))])
     function = Function("kernel", [state, SX.sym("p", 0)], [SX(0), *outputs])
     native = NativeRows(write_rows_source(function, objective=True), find_compiler(), native_lanes())
@@ -171,7 +170,7 @@ def growth(rounds: int) -> list[Row]:
     X = candidates(objectives[11].problem, 200)
     times = side_by_side({str(n): (lambda o=o: o(X)) for n, o in objectives.items()}, rounds)
     for n in (41, 101, 1001):
-        limits = {"required": 9.5, "ambition": 9.2, "at_most": True} if n == 101 else {}
+        limits = {"required": 9.5, "at_most": True} if n == 101 else {}
         rows.append(Row(name=f"{n} samples against 11", value=ratio(times[str(n)], times["11"]), unit="x", **limits))
     objective = objectives[11]
     for count in (1, 10, 50, 1000, 10_000, 100_000):
@@ -187,7 +186,6 @@ def growth(rounds: int) -> list[Row]:
             value=ratio(times["one"], times["two"]),
             unit="x",
             required=1.7,
-            ambition=1.9,
             note="means something on an idle machine only",
         )
     )
@@ -227,6 +225,6 @@ def swarms(rounds: int) -> list[Row]:
     note = f"extrapolated from {generations // SLOW_PART} generations"
     return [
         Row(name="PSO 50 x 200", value=float(np.median(times["ours"])) * 1e3, unit="ms"),
-        Row(name="PSO against pymoo's on the same kernel", value=same, unit="x", required=15, ambition=25),
+        Row(name="PSO against pymoo's on the same kernel", value=same, unit="x", required=15),
         Row(name="PSO against pymoo's on NumPy and Pinocchio", value=by_hand, unit="x", note=note),
     ]

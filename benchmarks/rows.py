@@ -8,7 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nlp_gait.backends.kernel.compiler import native_lanes
+
 Array = np.ndarray
+LANES = 8  # of the processor for which ratios of vectorised code were required
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,8 +22,7 @@ class Row:
         name: what is measured.
         value: measured number.
         unit: for example ``"x"`` for a ratio, ``"s"``, ``"us"``.
-        required: number that must be reached, or None for information only.
-        ambition: number hoped for.
+        required: number that must be reached, or None for information only: absolute times belong to the machine.
         at_most: True if less is better.
         note: what belongs to the number.
     """
@@ -29,7 +31,6 @@ class Row:
     value: float
     unit: str
     required: float | None = None
-    ambition: float | None = None
     at_most: bool = False
     note: str = ""
 
@@ -56,6 +57,11 @@ def side_by_side(
     return {name: np.array(values) for name, values in times.items()}
 
 
+def scale_to_lanes(required: float) -> float:
+    """Return a ratio that is required with ``LANES`` for the lanes of this processor."""
+    return required * native_lanes() / LANES
+
+
 def ratio(slow: Array, fast: Array, times: float = 1.0) -> float:
     """Median over the rounds of slow / fast, multiplied by how much more work the fast one did."""
     return float(np.median(slow / fast)) * times
@@ -63,12 +69,12 @@ def ratio(slow: Array, fast: Array, times: float = 1.0) -> float:
 
 def table(rows: list[Row]) -> str:
     """Rows as aligned text."""
-    cells = [("measure", "measured", "required", "ambition", "", "note")]
+    cells = [("measure", "measured", "required", "", "note")]
     for row in rows:
         sign = "<=" if row.at_most else ">="
-        limits = (f"{sign} {number:g}" if number is not None else "" for number in (row.required, row.ambition))
-        verdict = {True: "ok", False: "MISSED", None: ""}[row.met]
-        cells.append((row.name, f"{row.value:.4g} {row.unit}", *limits, verdict, row.note))
+        required = "" if row.required is None else f"{sign} {row.required:g}"
+        met = {True: "ok", False: "MISSED", None: ""}[row.met]
+        cells.append((row.name, f"{row.value:.4g} {row.unit}", required, met, row.note))
     widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in cells
