@@ -91,6 +91,13 @@ def check_count(name: str, value: object, *, at_least: int = 1, at_most: int | N
     return whole
 
 
+def check_choice(name: str, value: object, choices: Iterable[object]) -> None:
+    """Raise InputError unless a value is one of the choices."""
+    known = list(choices)
+    if not any(value == choice and type(value) is type(choice) for choice in known):
+        raise InputError(f"{name} must be one of {', '.join(map(repr, known))}, got {format_value(value)}")
+
+
 def format_value(value: object) -> str:
     """Return a short text of any value, for messages."""
     try:

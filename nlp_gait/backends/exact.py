@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
@@ -86,6 +87,15 @@ class ExactModel:
 def build_exact_model(problem: GaitProblem) -> ExactModel:
     """Return the exact function of a problem, built once for all copies that differ in parameter values only."""
     return problem.build_once(_build)
+
+
+def check_row_bounds(problem: GaitProblem, names: Sequence[str], lower: Array, upper: Array) -> None:
+    """Raise InputError unless the bounds of rows are numbers, and the lower ones not above the upper ones."""
+    wrong = np.flatnonzero(~(lower <= upper))
+    if wrong.size:
+        i = wrong[0]
+        what = "NaN" if np.isnan(lower[i] + upper[i]) else f"inverted, lower {lower[i]:g} above upper {upper[i]:g},"
+        raise InputError(f"{problem.name}: bounds of constraint {names[i]} are {what} at these parameters; change them")
 
 
 def find_violated_rows(rows: Iterable[ConstraintValue]) -> tuple[ConstraintValue, ...]:

@@ -14,7 +14,8 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.errors import InputError, LiftedSenseError
+from nlp_gait.backends.exact import check_row_bounds
+from nlp_gait.errors import LiftedSenseError
 from nlp_gait.formulation import Array, GaitProblem, Point
 from nlp_gait.symbolic.nonsmooth import Lift, Lifted
 
@@ -61,10 +62,7 @@ class NlpModel:
     def bounds(self, problem: GaitProblem) -> dict[str, Array]:
         """Return the bounds of (z, s) and of g for a problem's parameter values, by CasADi's names."""
         lower, upper = (np.array(bound).ravel() for bound in self.row_bounds(problem.p))
-        wrong = np.flatnonzero(np.isnan(lower) | np.isnan(upper))
-        if wrong.size:
-            row = self.row_names[wrong[0]]
-            raise InputError(f"{problem.name}: a bound of {row} is NaN at these parameters; change them")
+        check_row_bounds(problem, self.row_names, lower, upper)
         free = np.full(self.lifted, np.inf)
         return {
             "lbx": np.concatenate([(problem.lower - self.offset) / self.scale, -free]),

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, Literal, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar, get_args
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.errors import InputError, format_value, unknown
+from nlp_gait.errors import InputError, check_choice, format_value, unknown
 from nlp_gait.formulation.signals import Array
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -99,6 +99,8 @@ class Grid:
             count = getattr(self, name)
             if isinstance(count, bool) or not isinstance(count, int) or count < 1:
                 raise InputError(f"{name} must be a whole number >= 1, got {count!r}")
+        check_choice("rule", self.rule, get_args(Quadrature))
+        check_choice("refined_by", self.refined_by, (None, "intervals", "samples_per_interval"))
         if self.rule == "simpson" and self.parts % 2:
             raise InputError(f"rule='simpson' needs an even number of parts between the samples, got {self.parts}")
 
@@ -129,7 +131,11 @@ class Objective:
 
     name: str
     unit: str
-    sense: Literal["minimise", "maximise"] = "minimise"
+    sense: Literal["minimise", "maximise", "minimize", "maximize"] = "minimise"  #: read with an s in all spellings
+
+    def __post_init__(self) -> None:
+        check_choice(f"objective {self.name!r}: sense", self.sense, ("minimise", "maximise", "minimize", "maximize"))
+        object.__setattr__(self, "sense", self.sense.replace("z", "s"))  # it is frozen
 
     @property
     def sign(self) -> float:
@@ -155,6 +161,7 @@ class Constraint:
 
     def __post_init__(self) -> None:
         owner = f"constraint {self.name!r}"
+        check_choice(f"{owner}: over", self.over, (None, *get_args(Over)))
         _check_number(owner, "scale", self.scale)
         if not self.scale > 0.0:
             raise InputError(f"{owner}: scale must be > 0 (a violation of this size counts as 1), got {self.scale}")
@@ -168,6 +175,12 @@ class Constraint:
                 raise InputError(f"{owner}: {end} must have one row or as many as value, {m}, got {count}")
         if self.lower is None and self.upper is None:
             raise InputError(f"{owner}: lower, upper or both are required")
+        _, lower, upper = self.columns
+        if lower.is_constant() and upper.is_constant():
+            inverted = np.flatnonzero(np.array(lower.to_DM() > upper.to_DM()).ravel())
+            if inverted.size:
+                low, high = (float(bound.to_DM()[int(inverted[0])]) for bound in (lower, upper))
+                raise InputError(f"{owner}: lower must not be above upper, got {low:g} and {high:g}")
         if isinstance(self.labels, str) or len(self.labels) != (len(self.labels) and m) or (m != 1 and not self.labels):
             raise InputError(
                 f"{owner}: value has {m} rows and labels has {len(self.labels)}; give one label per row"

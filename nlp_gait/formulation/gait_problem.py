@@ -17,7 +17,7 @@ from typing import Any, Concatenate, Literal, ParamSpec, TypeAlias, TypeVar
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.errors import InputError, UnknownNameError, format_value, unknown
+from nlp_gait.errors import InputError, UnknownNameError, check_choice, format_value, unknown
 from nlp_gait.formulation import assembly as parts
 from nlp_gait.formulation.added_limits import make_added_limits, parse_limits
 from nlp_gait.formulation.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Variable
@@ -56,6 +56,9 @@ class SolverHints:
     starts: int = 20  #: default number of starts; fewer where all lead to the same point, or each takes long
     #: False for a problem that only gradient methods can solve, with thousands of variables tied by equations
     searchable: bool = True
+
+    def __post_init__(self) -> None:
+        check_choice("hessian", self.hessian, ("exact", "limited-memory"))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,9 +12,18 @@ import pytest
 from casadi import MX
 
 from compare.study.task import ProblemSpec, Task
-from nlp_gait import load, solve, user_code
+from nlp_gait import compile_objective, load, solve, user_code
 from nlp_gait.errors import GaitError, InputError, UnknownNameError, UserCodeError
-from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Parameter, Variable
+from nlp_gait.formulation import (
+    Assembly,
+    Constraint,
+    GaitProblem,
+    Grid,
+    Objective,
+    Parameter,
+    SolverHints,
+    Variable,
+)
 from nlp_gait.formulation.registry import check_mathematics
 from nlp_gait.formulation.result import load_result
 from nlp_gait.user_code import hash_source
@@ -136,6 +145,12 @@ def test_messages_say_what_is_wrong_with_the_file(text: str, message: str, tmp_p
         ({"scale": 0.0}, "'knee': scale must be > 0"),
         ({"scale": "big"}, "'knee': scale must be a finite number, got 'big'"),
         ({"lower": None}, "'knee': lower, upper or both are required"),
+        ({"lower": 2.0, "upper": 1.0}, "'knee': lower must not be above upper, got 2 and 1"),
+        (
+            {"value": THREE, "labels": ("a", "b", "c"), "lower": 0.5, "upper": MX([1.0, 0.0, 1.0])},
+            "'knee': lower must not be above upper, got 0.5 and 0",
+        ),
+        ({"over": "foo"}, "'knee': over must be one of None, 'instant', .*, got 'foo'"),
     ],
 )
 def test_a_row_is_refused_by_name(change: dict[str, Any], message: str) -> None:
@@ -158,6 +173,37 @@ def test_objectives_variables_and_parameters_are_refused_by_name() -> None:
     x = Variable(name="x", unit="m", lower=0.0, upper=1.0, description="")
     with pytest.raises(InputError, match="duplicated: x"):
         GaitProblem(**{**vars_of(toy(corner)), "variables": (x, x)})
+
+
+@pytest.mark.parametrize("spelling", ["minimize", "maximize", "minimise", "maximise"])
+def test_both_spellings_of_a_sense_mean_the_same(spelling: Any) -> None:
+    objective = Objective(name="f", unit="1", sense=spelling)
+    assert objective.sense == spelling.replace("z", "s")
+    assert objective.sign == (1.0 if spelling.startswith("min") else -1.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (lambda value: Objective(name="f", unit="1", sense=value), "objective 'f': sense"),
+        (lambda value: Grid(intervals=2, rule=value), "rule"),
+        (lambda value: Grid(intervals=2, refined_by=value), "refined_by"),
+        (lambda value: SolverHints(hessian=value), "hessian"),
+    ],
+)
+@pytest.mark.parametrize("value", ["Minimise", "", 1, True])
+def test_a_value_that_a_data_class_does_not_allow_is_refused_when_it_is_made(make: Any, name: str, value: Any) -> None:
+    with pytest.raises(InputError, match=f"{name} must be one of .*, got {value!r}"):
+        make(value)
+
+
+def test_inverted_bounds_of_a_row_are_one_sentence_everywhere() -> None:
+    problem = toy(lambda x, y, limit, ops: (x, (replace(row(x, lower=limit), upper=MX(0.0)),)), limit=-1.0)
+    inverted = problem.with_values(limit=1.0)
+    assert solve(problem).converged and compile_objective(problem).names == ("x", "y")
+    for use in (solve, compile_objective):
+        with pytest.raises(InputError, match="bounds of constraint knee are inverted, lower 1 above upper 0, at these"):
+            use(inverted)
 
 
 def vars_of(problem: GaitProblem) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.exact import ExactModel, build_exact_model
+from nlp_gait.backends.exact import ExactModel, build_exact_model, check_row_bounds
 from nlp_gait.backends.kernel.compiler import read_native_source
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
@@ -27,6 +27,7 @@ class Kernel:
     def row_bounds(self, problem: GaitProblem) -> tuple[Array, Array]:
         """Return lower and upper bounds (m,) of the rows for the problem's parameter values."""
         lower, upper = (np.array(bound, dtype=float).ravel() for bound in self.bounds(problem.p))
+        check_row_bounds(problem, self.model.row_names, lower, upper)
         return lower, upper
 
 

@@ -4,10 +4,10 @@ import logging
 import math
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -25,7 +25,7 @@ from nlp_gait.backends.solvers.solver import (
     judge_point,
 )
 from nlp_gait.backends.solvers.working_set import LEAST_ROWS, WorkingSet
-from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.errors import CompilerError, InputError, check_choice
 from nlp_gait.files import make_temporary_folder
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
@@ -54,7 +54,6 @@ STATUS_WORDS = {
     "Solve_Succeeded": "converged",
     "Solved_To_Acceptable_Level": "converged to IPOPT's acceptable level only",
     "Infeasible_Problem_Detected": "converged to a point of local infeasibility",
-    "Maximum_Iterations_Exceeded": "stopped at the iteration limit",
     "Restoration_Failed": "restoration of feasibility failed",
     "Search_Direction_Becomes_Too_Small": "search direction became too small",
     "Diverging_Iterates": "iterates diverged",
@@ -62,6 +61,7 @@ STATUS_WORDS = {
     "Error_In_Step_Computation": "the linear solver failed",
     **REASONS,
 }
+RESTARTED = " from half way to the middle of the bounds"
 # MUMPS's approximate minimum fill takes 10 to 30 % less time than its automatic choice, for the same iterations.
 PIVOT_ORDER = 2
 # Barrier parameter at which a warm-started stage begins: near the last one, so that a good guess is not first driven off.
@@ -70,6 +70,9 @@ WARM_BARRIER = 1e-8
 # Solves times the NLP's variables from which compilation pays. NAO's single support, 174 variables: 0.2 s saved on each solve
 # against 2.5 s of compilation; its free joints, 3,900 variables: over a minute on each against 8 s.
 WORTHWHILE_SIZE = 1500
+# Iterations in a row that the first stage may spend on restoring feasibility alone. A start that needs more is abandoned: from
+# nao-ssp's, IPOPT took 140 to 300 iterations or ended at an infeasible point; from half way to the middle of the bounds, 25.
+LONGEST_RESTORATION = 10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +82,7 @@ class IpoptSettings(Solver):
     name: ClassVar[str] = "ipopt"
 
     tolerance: float = 1e-8  #: IPOPT's ``tol``
-    iterations: int = 300  #: limit of iterations for each stage, in the first stage for each set of rows
+    iterations: int = 500  #: limit of iterations of a run, all of its stages together
     #: Limit of wall time for all stages of a run [s]; selecting the rows of a large problem, once for all runs, has as much again
     time_limit_s: float = 300.0
     hessian: str | None = None  #: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem
@@ -106,12 +109,9 @@ class IpoptSettings(Solver):
             raise InputError(f"iterations and time_limit_s must be positive, got {got}")
         if not all(before > after > 0.0 for before, after in pairwise((math.inf, *self.widths))):
             raise InputError(f"widths must be positive and narrow from stage to stage, got {self.widths}")
-        if self.hessian not in (None, "exact", "limited-memory"):
-            raise InputError(f"hessian must be 'exact', 'limited-memory' or None, got {self.hessian!r}")
-        if self.barrier not in BARRIERS:
-            raise InputError(f"barrier must be one of {', '.join(BARRIERS)}, got {self.barrier!r}")
-        if self.linear_solver not in (None, *LINEAR_SOLVERS):
-            raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
+        check_choice("hessian", self.hessian, (None, "exact", "limited-memory"))
+        check_choice("barrier", self.barrier, BARRIERS)
+        check_choice("linear_solver", self.linear_solver, (None, *LINEAR_SOLVERS))
 
     def choose_settings(self, problem: GaitProblem, solves: int = 1) -> "IpoptSettings":
         # Whatever is cached: compiled and interpreted functions differ in the last bits, and the same call gives the same result.
@@ -153,7 +153,7 @@ class Ipopt(Solver):
         self.model = model = build_nlp(problem)
         started = time.perf_counter()
         self.linear_solver = find_linear_solver(settings.linear_solver)
-        self.time_limit_s = settings.time_limit_s
+        self.time_limit_s, self.iterations = settings.time_limit_s, settings.iterations
         self.widths = settings.widths if settings.widths and model.smoothed else model.widths
         self.watch = IterationWatch(model.nlp)
         general: dict[str, Any] = {
@@ -168,12 +168,13 @@ class Ipopt(Solver):
             **({"ipopt.mumps_pivot_order": PIVOT_ORDER} if self.linear_solver.lower() == "mumps" else {}),
         }
         options = {**general, "iteration_callback": self.watch}
+        brief = {"ipopt.max_resto_iter": LONGEST_RESTORATION}
         self.compiled = bool(settings.compiled)
         nlp = model.nlp
         if self.compiled:
             native = CompiledNlp(nlp, np.append(problem.p, self.widths[0]), second=settings.hessian == "exact")
             nlp, options = native.nlp, options | native.options
-        all_rows = ca.nlpsol("cold", "ipopt", nlp, options)
+        all_rows = ca.nlpsol("cold", "ipopt", nlp, {**options, **brief})
         names = (*NLP_VALUES, *DERIVATIVES.values())
         functions = {name: all_rows.get_function(name) for name in names if all_rows.has_function(name)}
         #: of the NLP, by the names of ``nlpsol``
@@ -191,10 +192,16 @@ class Ipopt(Solver):
             self.near = WatchedSolver(ca.nlpsol("near", "ipopt", nlp, {**options, **derivatives, **near}), self.watch)
         self.cold: WatchedSolver | WorkingSet = WatchedSolver(all_rows, self.watch)
         if settings.few_rows and nlp["g"].shape[0] >= LEAST_ROWS:
-            self.cold = self._make_working_set(problem, general, self.cold)
+            self.cold = self._make_working_set(problem, {**general, **brief})
+        self._patient = nlp, {**options, **derivatives}
         self.create_s = time.perf_counter() - started
 
-    def _make_working_set(self, problem: GaitProblem, options: Mapping[str, Any], whole: WatchedSolver) -> WorkingSet:
+    @cached_property
+    def patient(self) -> WatchedSolver:
+        """The first stage on all rows that restores feasibility for as long as it takes."""
+        return WatchedSolver(ca.nlpsol("patient", "ipopt", *self._patient), self.watch)
+
+    def _make_working_set(self, problem: GaitProblem, options: Mapping[str, Any]) -> WorkingSet:
         """Make a first stage that begins with few rows: ties of lifted variables, equations, and rows that one run needs.
 
         That run uses the parameters' defaults, so that it does not depend on which copy of the problem is solved first.
@@ -204,10 +211,10 @@ class Ipopt(Solver):
         bounds, width = model.bounds(usual), self.widths[0]
         always = bounds["lbg"] == bounds["ubg"]
         always[len(model.row_names) :] = True
-        cold = WorkingSet(model.nlp, self.functions, options, whole, self.watch, always)
+        cold = WorkingSet(model.nlp, self.functions, options, self.watch, always)
         start = model.start(usual, usual.start_point(np.random.default_rng(0)), width)
         with defer_interrupts() as pressed:
-            self.watch.begin(pressed, time.perf_counter() + self.time_limit_s)
+            self.watch.begin(pressed, time.perf_counter() + self.time_limit_s, self.iterations)
             cold.learn(x0=start, p=np.append(usual.p, width), **bounds)
         if pressed():
             raise KeyboardInterrupt
@@ -215,9 +222,17 @@ class Ipopt(Solver):
 
     @lock_casadi
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
-        """Run all stages from a start point (n,), each of which starts from the last one; see ``Solver``."""
-        start = {"x0": self.model.start(problem, x0, self.widths[0])}
-        return self._run_stages(problem, x0, start, self.widths, stop, cold=True)
+        """Run all stages from a start point (n,), each of which starts from the last one; see ``Solver``.
+
+        Where the first stage does not converge within a short restoration of feasibility, it starts again from half way to the
+        middle of the bounds; and if that fails, too, from the start point without this limit, on all rows.
+        """
+        half_way = (x0 + (problem.lower + problem.upper) / 2) / 2
+        attempts = [
+            (method, {"x0": self.model.start(problem, point, self.widths[0])})
+            for method, point in ((self.cold, x0), (self.cold, half_way), (None, x0))
+        ]
+        return self._run_stages(problem, x0, attempts, self.widths, stop)
 
     def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
         """Run the last stage alone from the outcome of a neighbouring problem; None if that has no multipliers."""
@@ -225,27 +240,33 @@ class Ipopt(Solver):
         if guess is None:
             return None
         x0 = np.clip(near.x, problem.lower, problem.upper)
-        return self._run_stages(problem, x0, _start_from(guess), self.widths[-1:], stop, cold=False)
+        return self._run_stages(problem, x0, [(self.warm, _start_from(guess))], self.widths[-1:], stop)
 
     @lock_casadi
     def _run_stages(
         self,
         problem: GaitProblem,
         x0: Array,
-        start: dict[str, Array],
+        attempts: Sequence[tuple["WatchedSolver | WorkingSet | None", dict[str, Array]]],
         widths: tuple[float, ...],
         stop: Stop,
-        cold: bool,
     ) -> Outcome:
-        """Run the stages. If the caller gives no ``stop``, Ctrl-C ends the iterations and is raised after them."""
+        """Run the stages, the first one by the first attempt that converges; None stands for ``patient``.
+
+        If the caller gives no ``stop``, Ctrl-C ends the iterations and is raised after them.
+        """
         run = _Run(problem=problem, x0=x0, bounds=self.model.bounds(problem))
         with defer_interrupts() if stop is never else nullcontext(stop) as pressed:
-            self.watch.begin(pressed, run.started + self.time_limit_s)
-            for width in widths:
-                guess = self._run_stage(run, self.cold if cold and width == widths[0] else self.warm, width, start)
-                if run.status in REASONS:
+            self.watch.begin(pressed, run.started + self.time_limit_s, self.iterations)
+            for number, (method, start) in enumerate(attempts):
+                guess = self._run_stage(run, method or self.patient, widths[0], start)
+                run.restarts = number
+                if run.status in CONVERGED or self.watch.reason:
                     break
-                start = _start_from(guess)
+            for width in widths[1:]:
+                if self.watch.reason:
+                    break
+                guess = self._run_stage(run, self.warm, width, _start_from(guess))
             outcome = self._run_narrower(run, self._judge(run, guess), guess)
         if stop is never and pressed():
             raise KeyboardInterrupt
@@ -269,7 +290,7 @@ class Ipopt(Solver):
             narrower = self._judge(run, next_guess)
             if not feasible or (narrower.converged and narrower.cost < outcome.cost):
                 outcome, guess = narrower, next_guess
-            if run.status in REASONS:
+            if self.watch.reason:
                 break
         return outcome
 
@@ -293,7 +314,7 @@ class Ipopt(Solver):
             run.x0,
             self.model.point(guess.primal),
             claimed=run.status in CONVERGED,
-            status=STATUS_WORDS.get(run.status, run.status.replace("_", " ").lower()),
+            status=STATUS_WORDS.get(run.status, run.status.replace("_", " ").lower()) + RESTARTED * (run.restarts == 1),
             iterations=run.iterations,
             evaluations=run.evaluations,
             build_s=self.model.build_s,
@@ -325,6 +346,7 @@ class _Run:
     iterations: int = 0
     evaluations: Evaluations = field(default_factory=Evaluations)
     status: str = ""  # of the last stage: IPOPT's, or why it was ended
+    restarts: int = 0  # of the first stage
 
 
 def _start_from(guess: Guess) -> dict[str, Array]:

@@ -22,9 +22,11 @@ from nlp_gait.interrupts import never
 from nlp_gait.processes import has_fork, run_in_isolation
 
 INTERRUPTED, TIME_IS_UP, KILLED = "Interrupted", "Maximum_WallTime_Exceeded", "Killed"
+TOO_MANY = "Maximum_Iterations_Exceeded"
 REASONS = {
     INTERRUPTED: "was interrupted",
     TIME_IS_UP: "stopped at the time limit",
+    TOO_MANY: "stopped at the iteration limit",
     KILLED: "was ended within an iteration, after the time limit; iterations and calls of its stage are not counted",
 }
 # Variables from which one iteration may outlast the time limit: of the 15,754 of stairs-track's, one took 591 s.
@@ -128,10 +130,18 @@ class IterationWatch(ca.Callback):
         self._of_thread: threading.local = threading.local() if shared is None else shared._of_thread
         self.construct("watch", {})
 
-    def begin(self, stop: Callable[[], bool], deadline: float) -> None:
-        """Watch the next run of this thread, until ``stop`` returns True or a deadline of ``time.perf_counter`` [s]."""
+    def begin(self, stop: Callable[[], bool], deadline: float, iterations: float = math.inf) -> None:
+        """Watch the next run of this thread, until ``stop`` returns True.
+
+        ``deadline``, a time of ``time.perf_counter`` [s], and ``iterations`` are limits of all its stages together.
+        """
         limit_casadi_threads()
         self._of_thread.stop, self._of_thread.deadline, self._of_thread.reason = stop, deadline, ""
+        self._of_thread.left, self._of_thread.seen = iterations, 0
+
+    def count(self, iterations: int) -> None:
+        """Count the iterations of a finished stage."""
+        self._of_thread.left, self._of_thread.seen = self._of_thread.left - iterations, 0
 
     def end(self, reason: str) -> None:
         """Say why the run of this thread ends."""
@@ -172,8 +182,11 @@ class IterationWatch(ca.Callback):
         send = getattr(self._of_thread, "send", None)
         if send is not None and iterate is not None:
             send(_pack_iterate(dict(zip(self._sizes, iterate, strict=True))))
+        self._of_thread.seen += 1  # the start point is seen, too
         if self.stop():
             self.end(INTERRUPTED)
+        elif self._of_thread.seen > self._of_thread.left:
+            self.end(TOO_MANY)
         elif time.perf_counter() >= self.deadline:
             self.end(TIME_IS_UP)
         return [int(bool(self.reason))]
@@ -196,10 +209,12 @@ class WatchedSolver:
 
     def __call__(self, **arguments: Any) -> Mapping[str, Any]:
         """Solve the NLP."""
+        result: Mapping[str, Any]
         if len(arguments["lbx"]) >= LARGE and has_fork():
-            return self._call_in_fork(arguments)
-        result: Mapping[str, Any] = self._solver(**arguments)
-        self._stats = self._solver.stats()
+            result = self._call_in_fork(arguments)
+        else:
+            result, self._stats = self._solver(**arguments), self._solver.stats()
+        self._watch.count(int(self._stats["iter_count"]))
         return result
 
     def _call_in_fork(self, arguments: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -1,8 +1,7 @@
 """IPOPT on the few rows of an NLP that matter: most limits of a gait are far away during the whole run.
 
 A run begins with few rows. At its end those that are violated are added, and the run continues, until no row is violated. So
-the result is a local optimum of the whole NLP; the multipliers of rows that were never added are zero. If IPOPT does not
-converge on some of the rows, it starts again with all of them.
+the result is a local optimum of the whole NLP; the multipliers of rows that were never added are zero.
 """
 
 from collections.abc import Mapping
@@ -20,7 +19,8 @@ from nlp_gait.formulation import Array
 
 Rows = NDArray[np.bool_]
 
-ROUNDS = 8  # in which rows are added, before all rows are used
+ROUNDS = 8  # in which rows are added
+UNSETTLED = "rows_were_violated_in_each_round"
 VIOLATED = 1e-8  # IPOPT's tolerance
 CACHED_SOLVERS = 16  # on different rows
 LEAST_ROWS = 100  # of an NLP for which this pays
@@ -34,43 +34,37 @@ class WorkingSet:
         nlp: Mapping[str, MX],
         functions: Mapping[str, ca.Function],
         options: Mapping[str, Any],
-        whole: WatchedSolver,
         watch: IterationWatch,
         always: Rows,
     ) -> None:
         """Take the NLP, its functions by the names of ``nlpsol``, and IPOPT's options without derivatives and the watch.
 
-        ``whole`` is IPOPT on all rows, ``watch`` its watch, which also ends other runs; these begin with ``always`` (m,).
+        ``watch`` ends runs; these begin with ``always`` (m,).
         """
         self._nlp, self._functions, self._options = nlp, functions, options
-        self._whole, self._watch = whole, watch
-        self._begin = always
+        self._watch, self._begin = watch, always
         self._get_solver = lru_cache(CACHED_SOLVERS)(self._make_solver)
         self._stats: dict[str, Any] = {}
 
     def learn(self, **arguments: Any) -> None:
         """Add the rows that are violated at a start point, or added in a run from it, to those with which runs begin."""
         self._begin = self._begin | self._find_violated(arguments["x0"], arguments)
-        result, rows = self._solve_on_few_rows(arguments)
-        if result is not None:
+        _, rows = self._solve_on_few_rows(arguments)
+        if self._stats["success"]:
             self._begin = rows
 
     def __call__(self, **arguments: Any) -> Mapping[str, Any]:
         """Solve the NLP; multipliers of the start are ignored."""
-        self._stats = {}
-        result, _ = self._solve_on_few_rows(arguments)
-        if result is None:
-            result = self._whole(**arguments)
-            self._count(self._whole.stats())
-        return result
+        return self._solve_on_few_rows(arguments)[0]
 
     def stats(self) -> Mapping[str, Any]:
         """Return the statistics of the last call: sums over its runs."""
         return self._stats
 
-    def _solve_on_few_rows(self, arguments: Mapping[str, Any]) -> tuple[Mapping[str, Any] | None, Rows]:
-        """Return a result that violates no row, and the rows that it used; None if all rows are needed."""
+    def _solve_on_few_rows(self, arguments: Mapping[str, Any]) -> tuple[Mapping[str, Any], Rows]:
+        """Return a result, which violates no row where the statistics report success, and the rows that it used."""
         rows, start = self._begin, arguments["x0"]
+        self._stats = {}
         for _ in range(ROUNDS):
             chosen = np.flatnonzero(rows)
             solver = self._get_solver(rows.tobytes())
@@ -81,15 +75,12 @@ class WorkingSet:
             multipliers = np.zeros(len(rows))
             multipliers[chosen] = np.asarray(solved["lam_g"]).ravel()
             result = {"x": solved["x"], "lam_x": solved["lam_x"], "lam_g": multipliers}
-            if self._watch.reason:
-                return result, rows
-            if not stats["success"]:
-                break
             violated = self._find_violated(solved["x"], arguments) & ~rows
-            if not violated.any():
+            if self._watch.reason or not stats["success"] or not violated.any():
                 return result, rows
             rows, start = rows | violated, solved["x"]
-        return None, rows
+        self._stats |= {"success": False, "return_status": UNSETTLED}
+        return result, rows
 
     def _find_violated(self, x: Any, arguments: Mapping[str, Any]) -> Rows:
         g = np.asarray(self._functions["nlp_g"](x, arguments["p"])).ravel()

@@ -112,14 +112,15 @@ def test_outcomes_rank_by_convergence_then_feasibility_then_violation() -> None:
 def test_what_ipopt_returns_is_described_in_words(returned: str, words: str) -> None:
     """The limit is out of reach, so that the exact functions find every point infeasible."""
     problem = toy(corner, limit=2.5)
-    ready = IpoptSettings(iterations=1).prepare(problem)
+    ready = IpoptSettings().prepare(problem)
     ready.cold = Returning(ready.cold, returned)  # type: ignore[assignment]
+    ready.patient = Returning(ready.patient, returned)  # type: ignore[assignment]
     outcome = ready.run(problem, np.array([-2.0, -1.0]))
     assert (outcome.converged, outcome.claimed, outcome.status) == (False, False, words)
 
 
 class Returning:
-    """A solver of CasADi's that returns another status after its first iteration."""
+    """A solver of CasADi's that returns another status."""
 
     def __init__(self, solver: ca.Function, status: str) -> None:
         self.solver, self.status = solver, status

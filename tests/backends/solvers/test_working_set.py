@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from casadi import MX
 
+from nlp_gait.backends.solvers import working_set
 from nlp_gait.backends.solvers.ipopt import QUIET, IpoptSettings
 from nlp_gait.backends.solvers.solver import INTERRUPTED, IterationWatch
 from nlp_gait.backends.solvers.working_set import WorkingSet
@@ -18,7 +19,9 @@ SIDES = 200
 NAMES = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l")
 
 
-def polygon(*, linear: bool = False) -> tuple[WorkingSet, ca.Function, IterationWatch, dict[str, Any]]:
+def polygon(
+    *, linear: bool = False, always: Any = None
+) -> tuple[WorkingSet, ca.Function, IterationWatch, dict[str, Any]]:
     """The point of a polygon of many sides about the unit circle that is nearest to (2, 1), or farthest in a direction."""
     x, p = MX.sym("x", 2), MX.sym("p")
     angles = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
@@ -27,7 +30,7 @@ def polygon(*, linear: bool = False) -> tuple[WorkingSet, ca.Function, Iteration
     watch = IterationWatch(nlp)
     whole = ca.nlpsol("whole", "ipopt", nlp, {**QUIET, "iteration_callback": watch})
     functions = {name: whole.get_function(name) for name in NAMES}
-    few = WorkingSet(nlp, functions, QUIET, whole, watch, np.zeros(SIDES, dtype=bool))
+    few = WorkingSet(nlp, functions, QUIET, watch, np.zeros(SIDES, dtype=bool) if always is None else always)
     inf = np.full(2, np.inf)
     arguments = {"p": [1.0], "lbx": -inf, "ubx": inf, "lbg": np.full(SIDES, -np.inf), "ubg": np.ones(SIDES)}
     watch.begin(never, math.inf)
@@ -53,11 +56,26 @@ def test_rows_that_are_violated_join_until_none_is() -> None:
     assert few.stats()["n_call_nlp_hess_l"] <= first
 
 
-def test_where_some_rows_are_not_enough_all_are_taken() -> None:
-    """Without rows a linear objective has no least value."""
-    few, whole, _, arguments = polygon(linear=True)
-    assert same(few(**arguments), whole(**arguments))
-    assert few.stats()["success"] and few.stats()["iter_count"] > whole.stats()["iter_count"]
+def test_where_some_rows_are_not_enough_the_run_fails() -> None:
+    """Without rows a linear objective has no least value; with two of them it has."""
+    few, *_, arguments = polygon(linear=True)
+    few(**arguments)
+    assert not few.stats()["success"]
+    rows = np.zeros(SIDES, dtype=bool)
+    rows[[20, 30]] = True
+    few, *_, arguments = polygon(linear=True, always=rows)
+    found = few(**{**arguments, "p": [1.02]})
+    corner = np.array([math.cos(25.5 * 2 * math.pi / SIDES), math.sin(25.5 * 2 * math.pi / SIDES)])
+    assert few.stats()["success"]
+    assert np.array(found["x"]).ravel() == pytest.approx(corner / math.cos(math.pi / SIDES), abs=1e-6)
+    assert np.flatnonzero(found["lam_g"] > 1e-3).tolist() == [25, 26]
+
+
+def test_rows_that_still_join_in_the_last_round_are_no_success(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(working_set, "ROUNDS", 1)
+    few, *_, arguments = polygon()
+    few(**arguments)
+    assert not few.stats()["success"] and few.stats()["return_status"] == working_set.UNSETTLED
 
 
 def test_a_run_that_is_ended_is_not_begun_again() -> None:
