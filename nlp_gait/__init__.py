@@ -60,7 +60,6 @@ PROBLEMS |= {
     "walk12": "nlp_gait.gaits.walk12.walk12_problem:walk12",
     "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
     "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",
-    "stairs-ideal": "nlp_gait.gaits.stairs.ideal:stairs_ideal",
     "stairs-climb": "nlp_gait.gaits.stairs.climb:stairs_climb",
     "gaitbench": "nlp_gait.gaitbench.suite_problem:gaitbench",
 }

@@ -15,12 +15,10 @@ from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import simulate_plan
 
 CASE = 2  # of Table IV, the problems' default
-# What the ideal step keeps in reserve: ZMP 4 cm inside the foot, 100 N on it, friction that exists.
-RESERVES = {"zmp_margin_m": 0.04, "least_stance_force_N": 100.0, "stance_friction": 0.6}
 
 
 def stairs() -> Iterator[str]:
-    """One step up: plans, tracked steps and the ideal; energies in J, |torque x rate|."""
+    """One step up: plans and tracked steps; energies in J, |torque x rate|."""
     yield header("gait", "result", "model J", "engine J", "tilt deg", "slip mm", "CoP mm", "middle", "landing mm")
     for label, result in climbs():
         plan = make_plan(result)
@@ -45,7 +43,7 @@ def describe_result(m: Measurements) -> str:
 
 def climbs() -> Iterator[tuple[str, Result]]:
     """Gaits on the stairs, each with its name."""
-    plan, track, ideal = (nlp_gait.load(f"stairs-{name}") for name in ("plan", "track", "ideal"))
+    plan, track = (nlp_gait.load(f"stairs-{name}") for name in ("plan", "track"))
     for case, printed in STAIRS_TABLE_4.items():
         sized = plan.with_values(stair_length_m=printed.stair_length_m, rise_run_ratio=printed.rise_run_ratio)
         yield f"plan, optimum, case {case}", optimal_climb(sized)
@@ -57,8 +55,6 @@ def climbs() -> Iterator[tuple[str, Result]]:
     printed_loop = track.with_values(gravity_compensation=0.0)
     yield "tracked, paper's gains", _at(printed_loop, (case_2.kp, case_2.kd, case_2.torso_pitch_rad))
     yield "tracked, optimum", _at(track, nlp_gait.solve(track, starts=1, seed=0).x)
-    for label, variant in (("ideal", ideal), ("ideal with reserves", ideal.with_values(**RESERVES))):
-        yield label, _at(variant, nlp_gait.solve(variant, starts=1, seed=0).x)
 
 
 def optimal_climb(problem: GaitProblem) -> Result:

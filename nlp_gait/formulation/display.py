@@ -44,11 +44,11 @@ class SimulationModel:
     heat_loss: str | None = None  #: parameter with the heat constant K [W/(Nm)^2]; None for motors without known heat
     repeats: bool = False  #: several steps can be simulated one after the other
     steps: int | None = None  #: of a whole walk; None for a phase, or for one step
-    #: From a point and a number of steps to time histories on a dense grid, in the robot's joints and with the arrays of
+    #: From a point to time histories on a dense grid, in the robot's joints and with the arrays of
     #: ``SIMULATED``; None if those of the problem are that already, and the next step is the mirror image
-    motion: Callable[[NumericPoint, int], Signals] | None = None
-    #: From a point and a number of steps to the stairs; None for a flat floor
-    ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None
+    motion: Callable[[NumericPoint], Signals] | None = None
+    #: From a point to the stairs; None for a flat floor
+    ground: Callable[[NumericPoint], tuple[Tread, ...]] | None = None
     planar: bool = False  #: the root moves in the sagittal plane only
 
 

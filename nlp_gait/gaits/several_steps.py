@@ -25,10 +25,10 @@ UNMOVED = (*JOINT_ARRAYS, "left_bears", "right_bears")
 MIRRORED_ATTITUDE = np.array([1.0, -1.0, 1.0, -1.0])
 
 
-def repeat_steps(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.0) -> Signals:
-    """Return several steps of a cycle that ends in the mirror image of its start, each ``rise_m`` higher; InputError for none."""
+def repeat_steps(cycle: Signals, robot: Robot, steps: int) -> Signals:
+    """Return several steps of a cycle that ends in the mirror image of its start; InputError for none."""
     steps = check_count("steps", steps)
-    return join_steps([cycle] * steps, robot, np.outer(np.arange(steps), [measure_step(cycle), 0.0, rise_m, 0.0]))
+    return join_steps([cycle] * steps, robot, np.outer(np.arange(steps), [measure_step(cycle), 0.0, 0.0, 0.0]))
 
 
 def join_steps(steps: Sequence[Signals], robot: Robot, places: Array) -> Signals:

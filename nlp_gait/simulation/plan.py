@@ -156,7 +156,7 @@ def make_plan(result: Result, steps: int | None = None) -> Plan:
         raise InputError(f"at most {MOST_STEPS} steps are simulated, got {steps}; use fewer")
     point = problem.at(result.x)
     if model.motion is not None:
-        signals = model.motion(point, 1 if steps is None else steps)
+        signals = model.motion(point)
     else:
         signals = sample_finely(result)
         signals = signals if steps is None else repeat_steps(signals, model.robot, steps)
@@ -173,7 +173,7 @@ def make_plan(result: Result, steps: int | None = None) -> Plan:
         heat_loss=0.0 if model.heat_loss is None else problem.value(model.heat_loss),
         gravity=model.gravity,
         slope_rad=model.slope_rad,
-        ground=() if model.ground is None else model.ground(point, steps or 1),
+        ground=() if model.ground is None else model.ground(point),
         steps=steps or model.steps,
         planar=model.planar,
     )

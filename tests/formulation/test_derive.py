@@ -81,7 +81,7 @@ def test_time_histories_are_those_of_the_base_problem(name: str) -> None:
         np.testing.assert_array_equal(after.arrays[key], values, err_msg=key)
 
 
-@pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle", pytest.param("stairs-ideal", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle", pytest.param("stairs-climb", marks=pytest.mark.slow)])
 def test_start_points_have_the_new_variable_within_its_current_bounds(name: str) -> None:
     """Where the problem has start points of its own, and where it has none."""
     options: dict[str, Any] = {"nao-cycle": {"objective": "power"}}.get(name, {})

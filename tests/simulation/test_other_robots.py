@@ -37,13 +37,6 @@ def climb() -> Result:
     return result_of(nlp_gait.load("stairs-plan"), CLIMB)
 
 
-@pytest.fixture(scope="module")
-def ideal() -> Result:
-    """Its start: a motion with forces below toe and sole."""
-    problem = nlp_gait.load("stairs-ideal")
-    return result_of(problem, problem.start_point(np.random.default_rng(1)))
-
-
 def test_the_planned_climb_needs_the_torques_of_the_engine(climb: Result) -> None:
     own = climb.problem.signals(climb.x)
     plan = make_plan(climb)
@@ -68,16 +61,6 @@ def test_the_planned_climb_needs_the_torques_of_the_engine(climb: Result) -> Non
     np.testing.assert_allclose(planned, senses * model[:, columns], atol=AGREEMENT_NM)
 
 
-def test_the_ideal_step_is_simulated_through_its_own_instants(ideal: Result) -> None:
-    own, plan = ideal.problem.signals(ideal.x), make_plan(ideal)
-    per_interval = (len(plan.signals.arrays["t"]) - 1) // (len(own.arrays["t"]) - 1)
-    simulated = {name: array[::per_interval] for name, array in plan.signals.arrays.items()}
-    np.testing.assert_allclose(simulated["t"], own.arrays["t"], atol=1e-12)
-    knee, joint = plan.joints.index("RKnee"), own.joints.index("knee")
-    np.testing.assert_allclose(simulated["q"][:-1, knee], own.arrays["q"][:-1, joint], atol=1e-12)
-    np.testing.assert_allclose(simulated["tau"][:-1, knee], own.arrays["tau"][:-1, joint], atol=AGREEMENT_NM)
-
-
 def test_the_stairs_are_two_boxes_and_the_root_stays_in_the_plane(climb: Result) -> None:
     root = Xml.fromstring(make_plan_model(make_plan(climb), Drive()))
     boxes = [geometry for geometry in root.findall("./worldbody/geom") if geometry.get("type") == "box"]
@@ -99,16 +82,6 @@ def test_feet_begin_on_their_treads_and_toes_are_part_of_them(climb: Result) -> 
     assert all(isinstance(shapes[f"{side} {part}"][-1], Prism) for side in start for part in ("sole", "toe"))
     (shank,) = shapes["left shank"]
     assert isinstance(shank, Capsule) and shank.end[2] == pytest.approx(-0.36)  # its round end stays above the ground
-
-
-def test_steps_that_repeat_lead_on_up_with_the_legs_exchanged(ideal: Result) -> None:
-    one, three = make_plan(ideal), make_plan(ideal, 3)
-    n = len(one.signals.arrays["t"]) - 1
-    left, right = (three.signals.arrays[f"{side}_foot"] for side in ("left", "right"))
-    rise = ideal.problem.value("rise_run_ratio") * ideal.problem.value("stair_length_m") / 2
-    np.testing.assert_allclose(left[n + 1 : 2 * n + 1, 2], one.signals.arrays["right_foot"][1:, 2] + rise, atol=1e-12)
-    assert np.ptp(right[n + 1 : 2 * n + 1], axis=0).max() < 1e-9
-    assert len(three.ground) == 4 and len(one.ground) == 2
 
 
 def test_a_lean_that_changes_gives_the_torso_a_spin() -> None:

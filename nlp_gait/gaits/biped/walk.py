@@ -234,7 +234,7 @@ def plan_whole_walk(body: Body, steps: int, grid: Grid, flight: Flight | None = 
     flight.check_run(next(variable.upper for variable in variables if variable.name == STEP))
     variables = tuple(_raise_lift(v, body, flight) for v in variables)
     treads = flight.list_treads(steps - 1)
-    return make_walk_problem(replace(walk, variables=variables), variables, lambda point, count: treads).fix(
+    return make_walk_problem(replace(walk, variables=variables), variables, lambda point: treads).fix(
         **{STEP: flight.run_m}
     )
 
@@ -242,7 +242,7 @@ def plan_whole_walk(body: Body, steps: int, grid: Grid, flight: Flight | None = 
 def make_walk_problem(
     walk: WholeWalk,
     started: tuple[Variable, ...],
-    ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None,
+    ground: Callable[[NumericPoint], tuple[Tread, ...]] | None = None,
 ) -> GaitProblem:
     """Return the problem of a walk; start points are shares of the bounds of the variables ``started``."""
     start = make_walk_start(walk.body, started, walk.states, walk.sections)

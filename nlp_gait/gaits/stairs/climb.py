@@ -1,4 +1,4 @@
-"""Climbing several stairs at least effort, from standing to standing: steps of ``stairs-ideal`` whose speeds are continuous."""
+"""Climbing several stairs at least effort, from standing to standing: steps whose places and speeds are continuous."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,8 +16,8 @@ from nlp_gait.formulation.display import SimulationModel, Tread
 from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import stair
+from nlp_gait.gaits.stairs.climb_step import AXES, NOISE, PARAMETERS, ClimbStep, make_climb_step, make_equal_rows
 from nlp_gait.gaits.stairs.display import make_rigid_bodies, make_signals, measure_stair
-from nlp_gait.gaits.stairs.ideal import AXES, NOISE, PARAMETERS, IdealStep, make_equal_rows, make_ideal_step
 from nlp_gait.gaits.stairs.planar_biped import MOVING
 from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, compute_heights, compute_shank_gaps
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -71,8 +71,8 @@ def stairs_climb(*, stairs: int = 4, intervals: int = 50) -> GaitProblem:
         robot=make_rigid_bodies(),
         gravity=biped.GRAVITY,
         steps=stairs,
-        motion=lambda point, _: climb.compute_signals(point),
-        ground=lambda point, _: climb.list_treads(point),
+        motion=climb.compute_signals,
+        ground=climb.list_treads,
         planar=True,
     )
     return GaitProblem(
@@ -96,9 +96,9 @@ class Climb:
     intervals: int  # of each step
 
     @cached_property
-    def steps(self) -> dict[ClimbPart, IdealStep]:
+    def steps(self) -> dict[ClimbPart, ClimbStep]:
         """The distinct steps."""
-        return {stride: make_ideal_step(self.intervals, stride.behind, stride.ahead) for stride in PARTS}
+        return {stride: make_climb_step(self.intervals, stride.behind, stride.ahead) for stride in PARTS}
 
     @property
     def sequence(self) -> tuple[ClimbPart, ...]:

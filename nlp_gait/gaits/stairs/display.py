@@ -15,7 +15,6 @@ from casadi import SX
 
 from nlp_gait.formulation import Array, Columns, NumericPoint, Signals, SimulationModel
 from nlp_gait.formulation.display import LEFT, RIGHT, SIMULATED, TRUNK, Limb, Skeleton, Tread
-from nlp_gait.gaits.several_steps import repeat_steps
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs.stair import SETBACK
 from nlp_gait.robots import Foot, Joint, Link, Robot
@@ -162,22 +161,17 @@ class StepMotion(NamedTuple):
     desired: Array | None = None  # (T, 18) angles and rates of the links that a controller follows; None for q and qd
 
 
-def make_simulation_model(
-    step_motion: Callable[[NumericPoint], StepMotion], *, repeats: bool = False
-) -> SimulationModel:
-    """Return the engine's model of a step; one that repeats ends as it began, one step up and with the legs exchanged."""
+def make_simulation_model(step_motion: Callable[[NumericPoint], StepMotion]) -> SimulationModel:
+    """Return the engine's model of a step."""
 
-    def motion(point: NumericPoint, steps: int) -> Signals:
-        _, rise = measure_stair(point)
-        return repeat_steps(make_signals(step_motion(point), rise), make_rigid_bodies(), steps, rise_m=rise)
+    def motion(point: NumericPoint) -> Signals:
+        return make_signals(step_motion(point), measure_stair(point)[1])
 
-    def ground(point: NumericPoint, steps: int) -> tuple[Tread, ...]:
+    def ground(point: NumericPoint) -> tuple[Tread, ...]:
         tread, rise = measure_stair(point)
-        return tuple(Tread(edge_m=k * tread - SETBACK, height_m=(k + 1) * rise) for k in range(steps + 1))
+        return tuple(Tread(edge_m=k * tread - SETBACK, height_m=(k + 1) * rise) for k in range(2))
 
-    return SimulationModel(
-        robot=make_rigid_bodies(), gravity=biped.GRAVITY, repeats=repeats, motion=motion, ground=ground, planar=True
-    )
+    return SimulationModel(robot=make_rigid_bodies(), gravity=biped.GRAVITY, motion=motion, ground=ground, planar=True)
 
 
 def make_standing_step(
