@@ -57,7 +57,7 @@ def test_the_drawn_stair_climber_is_where_its_planner_puts_it():
 
 
 def test_stairs_are_drawn_under_the_feet():
-    stairs = drawn("stairs-track")
+    stairs = drawn("stairs-plan")
     assert stairs.planar and stairs.support(0) is None
     rises = np.unique(stairs.ground[:, 1])
     assert len(rises) == 3 and rises[1] == 0.0 and rises[2] == pytest.approx(-rises[0])
