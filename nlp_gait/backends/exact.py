@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from random import Random
 from typing import NamedTuple
 
 import casadi as ca
@@ -84,8 +85,16 @@ class ExactModel:
         )
 
 
+# Solvers, targets and gaps have absolute tolerances of 1e-8 to 1e-9: an objective must change by more than this, or not at all.
+LEAST_CHANGE = 1e-4
+SAMPLES = 3  # points at which it is evaluated
+
+
 def build_exact_model(problem: GaitProblem) -> ExactModel:
-    """Return the exact function of a problem, built once for all copies that differ in parameter values only."""
+    """Return the exact function of a problem, built once for all copies that differ in parameter values only.
+
+    Raises InputError for an objective in units so large that solvers would take its changes for rounding errors.
+    """
     return problem.build_once(_build)
 
 
@@ -133,6 +142,22 @@ def _build(problem: GaitProblem) -> ExactModel:
     units += [variable.unit for variable in problem.variables]
     scales = np.array(ca.evalf(scale)).ravel()
     indexes = tuple(assembly.indexes)
-    return ExactModel(
+    model = ExactModel(
         function=function, row_names=tuple(names), row_units=tuple(units), row_scales=scales, index_names=indexes
     )
+    _check_change(problem, model)
+    return model
+
+
+def _check_change(problem: GaitProblem, model: ExactModel) -> None:
+    draw = Random(0).random  # NumPy's generators would take a tenth of a process's start to import
+    shares = np.array([[draw() for _ in problem.names] for _ in range(SAMPLES)])
+    costs = [model.at(x, problem.p).cost for x in problem.lower + shares * (problem.upper - problem.lower)]
+    finite = [cost for cost in costs if math.isfinite(cost)]
+    change = max(finite, default=0.0) - min(finite, default=0.0)
+    if 0.0 < change < LEAST_CHANGE:
+        unit = problem.objective.unit
+        raise InputError(
+            f"{problem.name}: {problem.objective.name} changes by {change:.2g} {unit} only between points within the bounds; "
+            "use a unit in which it changes by about 1"
+        )

@@ -14,6 +14,8 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import MX, SX
 
+from nlp_gait.errors import InputError
+
 # Keeps the slope of acos finite where its argument reaches 1 to machine precision.
 LEAST_SINE_SQUARED = 1e-16
 # Smallest margin from which the lifted acos is continued by its tangent.
@@ -47,7 +49,10 @@ class OpenRoots(NamedTuple):
 
 
 class Nonsmooth:
-    """Operations that a problem may use in addition to smooth functions, as the papers define them; ``Lifted`` overrides all."""
+    """Operations that a problem may use in addition to smooth functions, as the papers define them; ``Lifted`` overrides them.
+
+    ``abs``, ``min`` and ``step`` take arrays of any shape; those of one call have one shape, or are scalars.
+    """
 
     exact = True  #: whether the values are the exact ones, which are judged
 
@@ -84,11 +89,12 @@ class Nonsmooth:
 
     def min(self, *values: MX) -> MX:
         """Return the minimum of several values elementwise."""
+        check_shapes("min", *values)
         return reduce(ca.fmin, values)
 
     def largest(self, v: MX) -> MX:
-        """Return the largest |v_i| of a vector (m, 1): it is halved repeatedly, by elementwise operations only."""
-        v = ca.fabs(v)
+        """Return the largest |v_i| of all elements: they are halved repeatedly, by elementwise operations only."""
+        v = ca.fabs(ca.vec(v))
         while v.shape[0] > 1:
             half = (v.shape[0] + 1) // 2
             v = ca.fmax(v[:half], v[-half:])
@@ -96,6 +102,7 @@ class Nonsmooth:
 
     def step(self, switch: MX, below: MX, above: MX) -> MX:
         """Return ``below`` where switch < 0, else ``above``, elementwise; without a branch so that it vectorises."""
+        check_shapes("step", switch, below, above)
         return below + (switch >= 0) * (above - below)
 
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
@@ -104,6 +111,14 @@ class Nonsmooth:
         ``step`` goes from a state (n, 1) and a column of each input (m, N) to the next state, first from ``initial`` (n, 1).
         """
         return step.mapaccum(inputs[0].shape[1])(initial, *inputs)
+
+
+def check_shapes(operation: str, *values: MX) -> None:
+    """Raise InputError unless the values of an elementwise operation have one shape or are scalars."""
+    shapes = list(dict.fromkeys(MX(value).shape for value in values if MX(value).shape != (1, 1)))
+    if len(shapes) > 1:
+        got = " and ".join(map(str, shapes))
+        raise InputError(f"ops.{operation} takes arrays of one shape, or scalars, got {got}; transpose or repeat one")
 
 
 class Exact(Nonsmooth):
@@ -155,9 +170,7 @@ class Lifted(Nonsmooth):
         return OpenRoots(*(ca.vertcat(*columns) for columns in zip(*roots, strict=True))) if roots else None
 
     def tie_roots(self, start: MX, residual: Callable[[MX], MX]) -> MX:
-        columns = start.shape
-        lifted = self._lift("root", ca.vec(start), lambda v: ca.vec(residual(ca.reshape(v, *columns))), tight=True)
-        return ca.reshape(lifted, *columns)
+        return self._lift("root", start, residual, tight=True)
 
     def acos(self, argument: SX, margin: SX) -> Angle:
         """Continue acos by its tangents outside +-(1 - margin): smooth, with a slope that draws a solver back."""
@@ -173,18 +186,22 @@ class Lifted(Nonsmooth):
 
     def abs(self, v: MX) -> MX:
         """Return a variable s with s >= v and s >= -v."""
-        return self._lift("abs", ca.fabs(v), lambda s: ca.vertcat(s - v, s + v))
+        return self._lift("abs", ca.fabs(v), lambda s: ca.vertcat(ca.vec(s - v), ca.vec(s + v)))
 
     def min(self, *values: MX) -> MX:
         """Return a variable d with d <= v for each value v."""
-        return self._lift("min", super().min(*values), lambda d: ca.vertcat(*(v - d for v in values)), from_above=False)
+        return self._lift(
+            "min", super().min(*values), lambda d: ca.vertcat(*(ca.vec(v - d) for v in values)), from_above=False
+        )
 
     def largest(self, v: MX) -> MX:
         """Return a variable s with s >= v_i and s >= -v_i for all i."""
+        v = ca.vec(v)
         return self._lift("largest", ca.norm_inf(v), lambda s: ca.vertcat(s - v, s + v))
 
     def step(self, switch: MX, below: MX, above: MX) -> MX:
         """Return a sigmoid between the two branches."""
+        check_shapes("step", switch, below, above)
         self.smoothed = True
         share = 0.5 * (1 + ca.tanh(switch / (2 * self.width)))
         return below + share * (above - below)
@@ -200,6 +217,8 @@ class Lifted(Nonsmooth):
         return path
 
     def _lift(self, name: str, value: MX, rows: Callable[[MX], MX], **kind: bool) -> MX:
-        variable = MX.sym(f"{name}_{len(self.lifts)}", value.shape[0])
-        self.lifts.append(Lift(variable=variable, value=value, rows=rows(variable), **kind))
-        return variable
+        """Return variables of the value's shape; ``rows`` makes their rows, of any shape."""
+        variable = MX.sym(f"{name}_{len(self.lifts)}", value.numel())
+        shaped = ca.reshape(variable, *value.shape)
+        self.lifts.append(Lift(variable=variable, value=ca.vec(value), rows=ca.vec(rows(shaped)), **kind))
+        return shaped

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from casadi import MX
 
+from nlp_gait import compile_objective, solve
 from nlp_gait.backends.exact import ExactValues, build_exact_model
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint, GaitProblem, load
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -71,3 +73,20 @@ def test_the_rows_of_a_nao_phase_are_all_there_and_named(name: str, rows: int) -
     assert {"joint_angle[LKneePitch, 3]", "torque_change[RWristYaw, 9]", "dbm_x[10]", "dbm_y_mean"} < set(
         exact.row_names
     )
+
+
+def test_an_objective_in_units_that_are_too_large_is_refused_everywhere() -> None:
+    """IPOPT would converge 170 % above the optimum, and every search would have reached it."""
+
+    def scaled(unit: float) -> GaitProblem:
+        return toy(
+            lambda x, y, limit, ops: (unit * ((x - 1) ** 2 + (y - 1) ** 2 + 1), (row(x + y, lower=3 + 0 * limit),))
+        )
+
+    for use in (solve, compile_objective):
+        with pytest.raises(
+            InputError, match="toy: cost changes by .*e-12 J only .*; use a unit in which it changes by"
+        ):
+            use(scaled(1e-12))
+    assert solve(scaled(1e-3)).objective == pytest.approx(1.5e-3, rel=1e-6)
+    assert solve(scaled(0.0)).converged  # a constant: any feasible point is an optimum

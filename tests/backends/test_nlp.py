@@ -5,12 +5,14 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from casadi import MX
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solve import solve
-from nlp_gait.errors import LiftedSenseError
-from nlp_gait.formulation import load
+from nlp_gait.errors import InputError, LiftedSenseError
+from nlp_gait.formulation import Constraint, load
+from nlp_gait.symbolic.nonsmooth import Exact, Lifted, Nonsmooth
 from tests.backends.toys import Mathematics, row, toy
 
 NAMES = ("nao-ssp", "nao-dsp")
@@ -85,3 +87,35 @@ def test_lifting_along_the_sense_is_exact_at_the_optimum(mathematics: Mathematic
 def test_lifting_against_the_sense_is_an_error(mathematics: Mathematics, where: str) -> None:
     with pytest.raises(LiftedSenseError, match=f"toy: .*{where}.*the lifted NLP would be wrong"):
         build_nlp(toy(mathematics))
+
+
+def test_operations_take_samples_of_several_joints() -> None:
+    """(k, N + 1) arrays, as an objective or a row over all samples is written; at x = y = 1 by hand."""
+
+    def mathematics(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+        t = ca.linspace(0.0, 1.0, 4).T
+        samples = ca.vertcat(x * (1 - t), y * (t - 0.5), x - y + 0 * t)  # (3, 4)
+        least = ops.min(samples[0, :], 3 * y + 0 * t, 2 - x)
+        return ca.sum2(ca.sum1(ops.abs(samples))) - ca.sum2(least), (row(ops.largest(samples), upper=1 + limit),)
+
+    problem = toy(mathematics)
+    exact, model = build_exact_model(problem), build_nlp(problem)
+    expected = 2.0 + 2 * (0.5 + 1 / 6) - 2.0  # |1 - t| and |t - 1/2| at 0, 1/3, 2/3 and 1, less min(1 - t, 3, 1)
+    assert exact.at([1.0, 1.0], problem.p).cost == pytest.approx(expected)
+    assert exact.at([1.0, 1.0], problem.p).g[0] == pytest.approx(1.0)
+    values = ca.Function("values", [model.nlp["x"], model.nlp["p"]], [model.nlp["f"]])
+    w = model.start(problem, np.array([1.0, 1.0]), WIDTH)
+    assert float(values(w, np.append(problem.p, WIDTH))) == pytest.approx(expected)
+    solution = solve(problem, starts=3)
+    assert solution.converged
+    assert solution.objective == pytest.approx(exact.at(solution.best.x, problem.p).cost)
+
+
+@pytest.mark.parametrize("interpretation", [Exact(), Lifted(MX(1e-3))])
+def test_shapes_that_differ_are_one_sentence(interpretation: Nonsmooth) -> None:
+    row_vector, column = MX.sym("a", 1, 3), MX.sym("b", 3)
+    with pytest.raises(InputError, match=r"ops.min takes arrays of one shape, or scalars, got \(1, 3\) and \(3, 1\)"):
+        interpretation.min(row_vector, column)
+    with pytest.raises(InputError, match="ops.step takes arrays of one shape"):
+        interpretation.step(row_vector, column, MX(1.0))
+    assert interpretation.min(row_vector, MX(2.0)).shape == (1, 3)
