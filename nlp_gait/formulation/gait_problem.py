@@ -24,7 +24,6 @@ from nlp_gait.formulation.assembly import Assembly, NumericPoint, Objective, Par
 from nlp_gait.formulation.display import Display
 from nlp_gait.formulation.locking import Cache, lock_casadi
 from nlp_gait.formulation.numbers import is_number, to_floats
-from nlp_gait.formulation.power_form import PowerForm
 from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -86,8 +85,8 @@ class GaitProblem:
     grid: parts.Grid | None = None  #: samples, or None if the problem has none
     #: The motion's rows as functions of time, one entry per phase; empty if they are defined on samples only
     rows_over_time: tuple[parts.RowsOverTime, ...] = ()
-    #: Makes the problem's least-power form for proofs; None if it has none
-    power_form: Callable[[GaitProblem], PowerForm] | None = None
+    #: Data of a least power for which the prover has formulas (``nlp_gait/proofs/nao``); None if it has none
+    least_power: object | None = None
     display: Display = Display()  #: what shows its gaits
     hints: SolverHints = SolverHints()  #: for solvers
     mathematics: int = 1  #: version of the formulas, raised by hand where they change on purpose
@@ -258,7 +257,7 @@ class GaitProblem:
             assemble=assemble,
             refine=None if self.refine is None else refine,
             rows_over_time=self.rows_over_time if change is None and not variables else (),
-            power_form=self.power_form if change is None and not variables else None,
+            least_power=self.least_power if change is None and not variables else None,
             display=replace(
                 self.display, motion=None if motion is None else lambda point: motion(point.select(self.names))
             ),

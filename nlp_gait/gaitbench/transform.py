@@ -140,7 +140,7 @@ def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[st
         assemble=assemble,
         refine=None if problem.refine is None else refine,
         rows_over_time=(),
-        power_form=None,
+        least_power=None,
         values={name: value for name, value in problem.values.items() if name not in bounds},
     )
 

@@ -4,7 +4,7 @@
    the function's instructions (``native/``: intervals, affine, quadratic; ``quadratic_tape.py`` prepares them).
 2. ``time_search.py``, ``guarantee.py``: forms over pieces of time prove that a gait satisfies its limits at every instant.
 3. ``boxes.py``, ``bounds.py``: forms over boxes of the variables prove that parts of a box hold no better feasible point.
-   A problem may bring formulas with narrow bounds (``GaitProblem.power_form``); nothing here knows a particular robot.
+   For NAO's phases there are formulas with narrow bounds (``nao/``, a ``PowerForm``).
 4. ``branch_and_bound.py``: halving the boxes proves a bound on the objective; ``checkpoint.py`` stores the open ones.
 5. ``certificate.py``: the bound as a file, the shipped ones (``certificates/``), and their check.
 

@@ -1,7 +1,7 @@
 """Bounds of a problem's cost over boxes, and the part of a box in which a better feasible point may lie.
 
-``AffineBounds`` read the exact functions of any problem; ``PowerBounds`` read the least-power form that a problem may have
-(``GaitProblem.power_form``), and are far narrower.
+``AffineBounds`` read the exact functions of any problem; ``PowerBounds`` read the least-power form of NAO's phases, and are far
+narrower.
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.power_form import AGREEMENT, WIDENING, PowerForm
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.gaits.nao.problems import LeastPower
 from nlp_gait.proofs.affine import AffineForms, AffineFunction
 from nlp_gait.proofs.boxes import Flags, Numbers, Remaining
+from nlp_gait.proofs.nao.phases import make_power_form
+from nlp_gait.proofs.power_form import AGREEMENT, WIDENING, PowerForm
 from nlp_gait.proofs.quadratic import QuadraticFunction
 
 # A box is enclosed again if an edge shrinks by this share, in so many rounds at most.
@@ -71,7 +73,7 @@ def make_bounds(problem: GaitProblem) -> Bounds:
 
 def has_power_form(problem: GaitProblem) -> bool:
     """Return whether a problem has a least-power form; user code may have changed the problem, but not the form."""
-    return problem.power_form is not None and not problem.loaded_as
+    return isinstance(problem.least_power, LeastPower) and not problem.loaded_as
 
 
 @lru_cache(maxsize=1)  # takes a second to build
@@ -164,9 +166,9 @@ class PowerBounds(Bounds):
     """Bounds of the least power over boxes of z, from forms of degree two."""
 
     def __init__(self, problem: GaitProblem) -> None:
-        if problem.power_form is None:
+        if not isinstance(problem.least_power, LeastPower):
             raise InputError(f"problem {problem.name!r} with its options has no least-power form")
-        form = problem.power_form(problem)
+        form = make_power_form(problem, problem.least_power)
         _compare(problem, form)
         self._function, self._poses = QuadraticFunction(form.function), QuadraticFunction(form.poses)
         self._form, self.root = form, form.box[None]
@@ -190,7 +192,7 @@ def _compare(problem: GaitProblem, form: PowerForm) -> None:
         InputError: they differ by more than rounding.
     """
     model, rng = build_exact_model(problem), np.random.default_rng(SEED)
-    domain = [k for k, name in enumerate(model.row_names) if name.startswith(form.domain)]
+    domain = [k for k, name in enumerate(model.row_names) if name.startswith("reach[")]
     compared = 0
     for _ in range(TRIES):
         x = rng.uniform(problem.lower, problem.upper)
@@ -207,9 +209,7 @@ def _compare(problem: GaitProblem, form: PowerForm) -> None:
         compared += 1
         if compared == POINTS:
             return
-    raise InputError(
-        f"problem {problem.name!r}: none of {TRIES} random points satisfies the constraints {form.domain}...]"
-    )
+    raise InputError(f"problem {problem.name!r}: none of {TRIES} random points is within reach")
 
 
 def _up(values: Array) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.formulation.power_form import Integers
+from nlp_gait.proofs.power_form import Integers
 from nlp_gait.symbolic.tape import read_tape
 
 # Operations of a tape, as in native/quadratic.hpp.

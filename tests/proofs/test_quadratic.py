@@ -8,8 +8,10 @@ from casadi import SX
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
-from nlp_gait.formulation.power_form import PowerForm, PowerRows
+from nlp_gait.gaits.nao.problems import LeastPower
 from nlp_gait.proofs.bounds import make_bounds
+from nlp_gait.proofs.nao.phases import make_power_form
+from nlp_gait.proofs.power_form import PowerForm, PowerRows
 from nlp_gait.proofs.quadratic import QuadraticForms, QuadraticFunction
 from tests.proofs.soundness import best_x, load
 
@@ -32,8 +34,8 @@ def evaluate(function: ca.Function, Z: np.ndarray) -> np.ndarray:
 
 def power_form(name: str) -> PowerForm:
     problem = nlp_gait.load(name, intervals=2)
-    assert problem.power_form is not None
-    return problem.power_form(problem)
+    assert isinstance(problem.least_power, LeastPower)
+    return make_power_form(problem, problem.least_power)
 
 
 @pytest.mark.slow

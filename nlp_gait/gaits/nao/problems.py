@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from nlp_gait.formulation import GaitProblem, maker
-from nlp_gait.formulation.power_form import PowerForm
 from nlp_gait.gaits.biped.body import ZmpGravity, ZmpMasses
 from nlp_gait.gaits.biped.loads import Division
 from nlp_gait.gaits.biped.phase import Derivatives
@@ -13,8 +12,8 @@ from nlp_gait.gaits.biped.problems import LoadOptions, MotorOptions, PhaseOption
 from nlp_gait.gaits.nao.body import Arms, NaoBody, make_nao
 
 STEP_M = 0.06
-# Options of the phases that have formulas for proofs, with one sample in each interval.
-FORM_OPTIONS = {
+# Options of the phases for which the prover has formulas, with one sample in each interval.
+PROVEN_OPTIONS = {
     "derivatives": "analytic",
     "trajectory": "cubic",
     "objective": "power",
@@ -24,6 +23,15 @@ FORM_OPTIONS = {
     "zmp_masses": 25,
     "rule": "trapezoid",
 }
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeastPower:
+    """A phase of least power, for the prover's formulas."""
+
+    body: NaoBody
+    step_m: float
+    division: Division | None  # of the torso in double support; None in single support
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +112,7 @@ def nao_ssp(robot: NaoReading, options: PaperPhase) -> GaitProblem:
     """
     body = robot.make_body()
     problem = make_support_problem(body, options, derivatives=options.derivatives)
-    return _add_power_form(problem, body, vars(robot) | vars(options))
+    return _add_least_power(problem, body, vars(robot) | vars(options))
 
 
 @maker
@@ -119,20 +127,15 @@ def nao_dsp(robot: DoubleSupportReading, options: PaperPhase, loads: PaperLoads)
     """
     body = robot.make_body()
     problem = make_support_problem(body, options, loads, options.derivatives)
-    return _add_power_form(problem, body, vars(robot) | vars(options), loads.torso_share)
+    return _add_least_power(problem, body, vars(robot) | vars(options), loads.torso_share)
 
 
-def _add_power_form(
-    problem: GaitProblem, body: NaoBody, options: Mapping[str, Any], rule: Division | None = None
+def _add_least_power(
+    problem: GaitProblem, body: NaoBody, options: Mapping[str, Any], division: Division | None = None
 ) -> GaitProblem:
-    """Return the problem with its formulas for proofs, if they are those of its options."""
-    usual = all(options.get(name, value) == value for name, value in FORM_OPTIONS.items())
+    """Return the problem with what the prover reads, if its formulas are those of the options."""
+    usual = all(options.get(name, value) == value for name, value in PROVEN_OPTIONS.items())
     if not usual or options["samples_per_interval"] > 1:
         return problem
-
-    def make(changed: GaitProblem) -> PowerForm:
-        from nlp_gait.gaits.nao.least_power.power_form import make_power_form  # which solvers do not need
-
-        return make_power_form(changed, body, body.check_step_length(options["step_length_m"]), rule)
-
-    return replace(problem, power_form=make)
+    step_m = body.check_step_length(options["step_length_m"])
+    return replace(problem, least_power=LeastPower(body=body, step_m=step_m, division=division))

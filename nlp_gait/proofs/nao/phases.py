@@ -13,36 +13,31 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.power_form import WIDENING, PowerForm, PowerRows
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.limits import SCALES
-from nlp_gait.gaits.biped.loads import Division
 from nlp_gait.gaits.biped.support_phases import place_hip, place_soles, place_stance
-from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
+from nlp_gait.gaits.nao.body import ARM_SWING
 from nlp_gait.gaits.nao.joints import measure_leg
-from nlp_gait.gaits.nao.least_power.power_instants import (
-    PAIRS,
-    PowerInstant,
-    PowerPhase,
-    make_double_support,
-    make_single_support,
-)
+from nlp_gait.gaits.nao.problems import LeastPower
+from nlp_gait.proofs.nao.instants import PAIRS, PowerInstant, PowerPhase, make_double_support, make_single_support
+from nlp_gait.proofs.power_form import WIDENING, PowerForm, PowerRows
 from nlp_gait.robots import Robot
 
 # Up to this angle its tangent is monotone; slack for angles that break their limits within the judge's tolerance [rad].
 STEEPEST, ANGLE_SLACK = 1.5, 1e-5
 
 
-def make_power_form(problem: GaitProblem, body: NaoBody, step_m: float, rule: Division | None) -> PowerForm:
-    """Return the power form of single support, or of double support with a rule that shares the torso, see ``share_torso``."""
+def make_power_form(problem: GaitProblem, data: LeastPower) -> PowerForm:
+    """Return the power form of single or double support."""
     cosine = (1.0 - problem.value("reach_margin")) + FEASIBILITY_TOLERANCE + WIDENING
-    if rule is None:
-        phase = make_single_support(body.robot, place_stance(body, step_m), ARM_SWING[Support.SINGLE], cosine)
+    body = data.body
+    if data.division is None:
+        phase = make_single_support(body.robot, place_stance(body, data.step_m), ARM_SWING[Support.SINGLE], cosine)
     else:
-        soles = place_soles(body, step_m)
+        soles = place_soles(body, data.step_m)
         places = soles, place_hip(body, soles), ARM_SWING[Support.DOUBLE]
-        phase = make_double_support(body.robot, *places, rule, cosine)
+        phase = make_double_support(body.robot, *places, data.division, cosine)
     return _make_form(problem, body.robot, phase)
 
 
@@ -93,7 +88,6 @@ class _Outputs:
         row, lower, upper = (np.array(column) for column in zip(*self.rows, strict=True))
         power, torque, rate, weight = (np.array(column) for column in zip(*self.terms, strict=True))
         heat, loss = (np.array(column) for column in zip(*self.heats, strict=True))
-        row, power, torque, rate, heat = (index.astype(np.int32) for index in (row, power, torque, rate, heat))
         return PowerRows(
             row=row,
             lower=lower,
@@ -154,7 +148,6 @@ def _make_form(problem: GaitProblem, robot: Robot, phase: PowerPhase) -> PowerFo
         poses=ca.Function("poses", [z], [ca.cse(ca.vertcat(*poses))]),
         pose_rows=np.array(out.pose_rows, dtype=np.int32),
         indexes=ca.Function("indexes", [z], list(indexes.values()), ["z"], list(indexes)),
-        domain="reach[",
     )
 
 
