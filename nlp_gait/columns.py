@@ -2,7 +2,8 @@
 
 import csv
 import math
-from collections.abc import Collection
+import re
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import is_numeric_text, read_text
 
 DELIMITERS = ",;\t"
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+UNNAMED = ("", "Unnamed: 0")  # names of an index, written by R and pandas
 EXACT = 2.0**53  # the floats from here on are not all whole numbers
 MOST = 2**63 - 1  # a whole number in 64 bits, as other programs read it
 
@@ -22,6 +25,7 @@ class CsvTable:
     header: tuple[str, ...]  # names of the columns; empty if the file has none
     rows: tuple[tuple[float, ...], ...]  # of equal length; NaN where a cell is empty
     lines: tuple[int, ...]  # line of each row in the file
+    texts: tuple[tuple[str, ...], ...]  # the cells as printed, with decimal points
 
     @property
     def width(self) -> int:
@@ -59,33 +63,107 @@ class CsvTable:
 
 
 def read_table(path: Path, what: str) -> CsvTable:
-    """Read a CSV file of numbers, separated by one of ``DELIMITERS``, with or without a header; raises InputError."""
-    text = read_text(path, what)
-    owner = f"{what} {str(path)!r}"
-    first = text.partition("\n")[0]
-    delimiter = max(DELIMITERS, key=first.count)
-    lines = enumerate(csv.reader(text.splitlines(), delimiter=delimiter), start=1)
-    filled = [(number, [cell.strip() for cell in row]) for number, row in lines if any(cell.strip() for cell in row)]
+    """Read a CSV file of numbers, see ``parse_table``; raises InputError."""
+    return parse_table(read_text(path, what), f"{what} {str(path)!r}")
+
+
+def parse_table(text: str, owner: str) -> CsvTable:
+    """Read numbers separated by one of ``DELIMITERS``, with or without a header.
+
+    What other programs add is skipped: a line ``sep=``, an unnamed column that counts the rows, unnamed empty columns at the end,
+    and lines that begin with ``#``, of which the last one may be the header. Raises InputError with the line and its cause.
+    """
+    comments = [line for line in text.splitlines() if line.startswith("#")]
+    lines = ["" if line.startswith("#") else line for line in text.splitlines()]
+    first = next((line for line in lines if line.strip()), "")
+    if declared := re.fullmatch(r'"?sep=(.)"?', first.strip(" \r")):
+        lines[lines.index(first)] = ""
+        delimiter = declared[1]
+    else:
+        delimiter = max(DELIMITERS, key=first.count)
+    rows = _split_cells(lines, delimiter, owner)
     header: tuple[str, ...] = ()
-    if filled and not all(is_numeric_text(cell) for cell in filled[0][1] if cell):
-        header = tuple(filled.pop(0)[1])
-        if len(set(header)) < len(header):
-            raise InputError(f"{owner}: two columns have the same name")
-    if not filled:
+    if rows and not all(_is_number(cell) for cell in rows[0][1] if cell):
+        header = tuple(rows.pop(0)[1])
+    elif (
+        rows and comments and len(names := comments[-1].strip("# ").split(delimiter)) == len(rows[0][1]) > 1
+    ):  # NumPy's savetxt
+        header = tuple(name.strip() for name in names)
+    if not rows:
         raise InputError(f"{owner} has no rows of numbers")
-    width = len(header) or len(filled[0][1])
-    rows = []
-    for number, row in filled:
+    header, rows = _drop_unnamed_columns(header, rows)
+    if "" in header:
+        raise InputError(f"{owner}: column {header.index('') + 1} has no name; name it or remove it")
+    if repeated := [name for k, name in enumerate(header) if name in header[:k]]:
+        raise InputError(f"{owner}: two columns have the same name {repeated[0]!r}; rename one of them")
+    _check_decimals(rows, owner)
+    width = len(header) or len(rows[0][1])
+    for number, row in rows:
         if len(row) != width:
-            raise InputError(f"{owner}, line {number}: {len(row)} cells, but {width} columns")
+            hint = "; do its numbers have decimal commas? Separate columns by semicolons" if delimiter == "," else ""
+            raise InputError(f"{owner}, line {number}: {len(row)} cells, but {width} columns{hint}")
         for cell in row:
-            if cell and not is_numeric_text(cell):
+            if cell and not _is_number(cell):
                 raise InputError(f"{owner}, line {number}: expected a number, got {cell[:40]!r}")
-        rows.append(tuple(_parse_number(cell) if cell else math.nan for cell in row))
-    return CsvTable(owner=owner, header=header, rows=tuple(rows), lines=tuple(number for number, _ in filled))
+    return CsvTable(
+        owner=owner,
+        header=header,
+        rows=tuple(tuple(_parse_number(cell) if cell else math.nan for cell in row) for _, row in rows),
+        lines=tuple(number for number, _ in rows),
+        texts=tuple(tuple(cell.replace(",", ".") for cell in row) for _, row in rows),
+    )
+
+
+def _split_cells(lines: Sequence[str], delimiter: str, owner: str) -> list[tuple[int, list[str]]]:
+    """Return the number and the cells of each line that is not empty."""
+    reader, rows = csv.reader(lines, delimiter=delimiter), list[tuple[int, list[str]]]()
+    try:
+        for row in reader:
+            if any(cells := [cell.strip() for cell in row]):
+                rows.append((reader.line_num, cells))
+    except csv.Error as error:
+        raise InputError(
+            f"{owner}, line {reader.line_num}: {error}; is a quotation mark missing, or is it not a CSV file?"
+        ) from error
+    return rows
+
+
+def _drop_unnamed_columns(
+    header: tuple[str, ...], rows: list[tuple[int, list[str]]]
+) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]]:
+    """Leave out what spreadsheets and data frames add: empty columns at the end, and a first one that counts the rows."""
+    width = max(len(row) for _, row in rows)
+    while width > 1 and not any(header[width - 1 :]) and not any(cell for _, row in rows for cell in row[width - 1 :]):
+        width -= 1
+    header, rows = header[:width], [(number, row[:width]) for number, row in rows]
+    if not header:
+        return header, rows
+    counted = [row[0] for _, row in rows]
+    counts = any(counted == [str(k + begin) for k in range(len(rows))] for begin in (0, 1))
+    if header[0] in UNNAMED and counts:
+        return header[1:], [(number, row[1:]) for number, row in rows]
+    return header, rows
+
+
+def _check_decimals(rows: Sequence[tuple[int, Sequence[str]]], owner: str) -> None:
+    """Raise InputError for commas that may separate thousands: next to decimal points, or before three digits everywhere."""
+    cells = [(number, cell) for number, row in rows for cell in row]
+    commas = [(number, cell) for number, cell in cells if "," in cell]
+    points = any("." in cell for _, cell in cells)
+    if commas and (points or all(THOUSANDS.fullmatch(cell) for _, cell in commas)):
+        number, cell = commas[0]
+        raise InputError(
+            f"{owner}, line {number}: the comma in {cell[:40]!r} may be a decimal comma or separate thousands; write decimal "
+            "points, and no separators of thousands"
+        )
+
+
+def _is_number(cell: str) -> bool:
+    """Return whether a cell is a number with a decimal point or comma."""
+    return is_numeric_text(cell.replace(",", ".", 1))
 
 
 def _parse_number(cell: str) -> float:
     """Return a number; a whole one that a float would round stays whole, as seeds do."""
-    value = float(cell)
+    value = float(cell.replace(",", ".", 1))
     return int(cell) if abs(value) >= EXACT and cell.isdecimal() else value

@@ -31,7 +31,6 @@ DEEPEST = 32  # levels of objects and lists; files of this package have six
 LARGEST_INTEGER = 2**63 - 1
 SHOWN = 60  # characters of a value in a message
 EXAMINED = 4096  # bytes at each end of a file that is to be replaced
-BYTE_ORDER_MARK = "\ufeff"
 # Writing takes far less, so an older temporary file belongs to no running process.
 LEFTOVER_AGE_S = 60.0
 LOCK = ".lock"  # stays in its folder: removed, it could be locked twice
@@ -118,13 +117,10 @@ def read_bytes(
 def read_text(
     path: Path, what: str, *, error: type[GaitError] = InputError, at_most: int = LARGEST_FILE, remedy: str = ""
 ) -> str:
-    """Return the text of a regular file in UTF-8 without a byte-order mark; arguments and errors as ``read_bytes``."""
+    """Return the text of a regular file in UTF-8, with or without a byte-order mark; arguments and errors as ``read_bytes``."""
     content = read_bytes(path, what, error=error, at_most=at_most, remedy=remedy)
     with convert_errors(f"{what} {str(path)!r} cannot be read", error, remedy):
-        text = content.decode("utf-8")
-        if text.startswith(BYTE_ORDER_MARK):
-            raise ValueError("it starts with a byte-order mark; save it as UTF-8 without one")
-    return text
+        return content.decode("utf-8-sig")
 
 
 def read_json(path: Path, what: str, *, error: type[GaitError] = InputError, remedy: str = "") -> Any:

@@ -61,6 +61,10 @@ def judge_gait(gait: RecordedGait, *, in_engine: bool = True, starts: int = STAR
     notes: list[str] = []
     if gait.motion.mirrored:
         notes.append("the right foot is the stance foot: left and right are exchanged in all results")
+    if gait.inferred:
+        notes.append(f"{describe_phases(gait)}, as its feet show; --touch-down names another landing time")
+    if noise := float(gait.motion.noise_rad.max()):
+        notes.append(f"angles are smoothed: noise or rounding of {noise:.1g} rad; torques and margins stay uncertain")
     if gait.motion.held:
         notes.append(f"held, because they are not in the file: {', '.join(gait.motion.held)}")
     optimum = engine = None
@@ -76,6 +80,14 @@ def judge_gait(gait: RecordedGait, *, in_engine: bool = True, starts: int = STAR
     return JudgedGait(
         recorded=gait, evaluation=evaluate(gait.problem, gait.x), optimum=optimum, engine=engine, notes=tuple(notes)
     )
+
+
+def describe_phases(gait: RecordedGait) -> str:
+    """Return the phases of a gait and their times in words."""
+    if gait.gait != "nao-cycle":
+        return f"{'single' if gait.gait == 'nao-ssp' else 'double'} support from 0 to {gait.motion.duration_s:.4g} s"
+    landing = gait.x[0]
+    return f"single support from 0 to {landing:.4g} s, double support from there to {gait.motion.duration_s:.4g} s"
 
 
 def _solve_optimum(gait: RecordedGait, starts: int) -> Evaluation:

@@ -118,6 +118,7 @@ class RecordedGait:
     motion: RecordedMotion  # on the left foot
     step_m: float  # from foot to foot
     lean_deg: float  # of the torso at the beginning
+    inferred: bool  # whether the phases are estimated from the motion
     # Makes the planned problem with the same robot, step and durations; raises InputError if this gait has none
     make_planned: Callable[[], GaitProblem]
 
@@ -216,7 +217,8 @@ def make_recorded_gait(
     # Torso and soles of a recorded motion may turn.
     body = replace(nao, family="recorded", title=f"A recorded gait of {nao.title}", upright=frozenset())
     motion = read_motion(angles, body)
-    if touch_down_s is None and gait in ("nao-ssp", "nao-dsp"):
+    inferred = touch_down_s is None and gait not in ("nao-ssp", "nao-dsp")
+    if touch_down_s is None and not inferred:
         phases = {Support.SINGLE if gait == "nao-ssp" else Support.DOUBLE: (0.0, motion.duration_s)}
     else:
         phases = motion.phases(touch_down_s)
@@ -229,12 +231,12 @@ def make_recorded_gait(
     step = float(foot[1, 0])
     x: tuple[float, ...] = (motion.duration_s,)
     if shown == "nao-cycle":
-        motions = {kind: motion.cut(*span) for kind, span in phases.items()}
+        motions = {kind: motion.cut(*span).smooth(motion.noise_rad > 0.0) for kind, span in phases.items()}
         build = partial(make_recorded_cycle_problem, motions, motion.repeats)
         x = (*(motion.duration_s for motion in motions.values()), step)
     else:
         (kind,) = phases
-        build = partial(make_recorded_phase_problem, kind, motion)
+        build = partial(make_recorded_phase_problem, kind, motion.smooth(motion.noise_rad > 0.0))
         step = float(foot[1, 0] - foot[0, 0]) / 2 if kind is Support.SINGLE else step
     problem = make_refinable(build, intervals, options)
     cosine = float(make_places_function(motion.body)(motion.q[0])[1])
@@ -244,6 +246,7 @@ def make_recorded_gait(
         x=x,
         motion=motion,
         step_m=step,
+        inferred=inferred,
         lean_deg=float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))),
         make_planned=partial(_load_planned, shown, problem, x, step),
     )

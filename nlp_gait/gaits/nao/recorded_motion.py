@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import casadi as ca
 import numpy as np
 from casadi import DM, SX
+from numpy.typing import NDArray
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
@@ -26,9 +28,15 @@ if TYPE_CHECKING:
 LEAST_ROWS = 5
 SAME_TIME_S = 1e-9
 LIFTED = 2e-3  # [m]; a foot that rises by less stands
-STILL = 1e-5  # [m]; a foot nearer than this to its last place has landed
+STILL = 1e-5  # [m]; a foot nearer than this to its last place has landed, or than SCATTER times its noise
+SCATTER = 4.0 * math.sqrt(2.0)  # standard deviations of the difference of two places, four of them
+FAR = 16.0  # from so many times the distance of a still foot, a swing's end is fitted
+NOISE_RAD = 1e-5  # smaller ones are ignored: angles with five decimals
+LARGEST_ANGLE = 4.0 * math.pi  # [rad]; larger ones are degrees, and those beyond half a turn wrapped
+LARGEST_PERIOD_S = 0.5  # between two rows; larger ones are milliseconds
 LEAST_SHARE = 0.02  # of the time; a shorter phase does not count
 CLOSED = 1e-3  # [rad]; a motion repeats if its end is nearer than this to the mirror image of its beginning
+MEDIAN = 0.6745  # of the absolute value of a standard normal variable
 FINE = 400  # instants at which a whole motion is evaluated
 
 
@@ -71,6 +79,22 @@ class RecordedMotion:
         q = CubicSpline(rows, self.q[within])(times)
         return replace(self, t=times - start_s, q=q)
 
+    @cached_property
+    def noise_rad(self) -> Array:
+        """Standard deviation (J,) of noise and rounding of each joint, zero where it is small."""
+        noise = estimate_noise(self.q)
+        return np.where(noise > NOISE_RAD, noise, 0.0)
+
+    def smooth(self, noisy: NDArray[np.bool_]) -> RecordedMotion:
+        """Return the motion with the smoothest quintic splines of the noisy joints (J,) that leave no more than their noise."""
+        from scipy.interpolate import BSpline, splrep
+
+        q, noise = self.q.copy(), estimate_noise(self.q)
+        for k in np.flatnonzero(noisy):
+            squares = len(self.t) * noise[k] ** 2
+            q[:, k] = BSpline(*splrep(self.t, q[:, k], k=5, s=squares, quiet=1))(self.t)
+        return replace(self, q=q)
+
     def right_foot(self, times: Array) -> Array:
         """Return the right sole under its ankle relative to the left one (T, 3): ahead, to the left, and above [m]."""
         (_, left_y, _), (_, height) = self.body.support, self.body.ankle("R")
@@ -85,7 +109,8 @@ class RecordedMotion:
     @property
     def repeats(self) -> bool:
         """Whether the end is the mirror image of the beginning, so that another step can follow."""
-        return bool(np.abs(self.q[-1] - self.mirror_image().q[0]).max() < CLOSED)
+        closed = np.maximum(CLOSED, SCATTER * estimate_noise(self.q))
+        return bool((np.abs(self.q[-1] - self.mirror_image().q[0]) < closed).all())
 
     def phases(self, touch_down_s: float | None = None) -> dict[Support, tuple[float, float]]:
         """Return start and end [s] of single and double support, or of one if there is only one."""
@@ -95,20 +120,40 @@ class RecordedMotion:
                 raise InputError(f"touch-down must be within the motion's {end:g} s, got {touch_down_s:g}")
             return {Support.SINGLE: (0.0, touch_down_s), Support.DOUBLE: (touch_down_s, end)}
         foot = self.right_foot(self.t)
-        if foot[:, 2].max() < LIFTED and np.ptp(foot[:, :2], axis=0).max() < LIFTED:
+        scatter = SCATTER * float(np.linalg.norm(estimate_noise(foot)))
+        lifted = LIFTED + 2.0 * scatter
+        if foot[:, 2].max() < lifted and np.ptp(foot[:, :2], axis=0).max() < lifted:
             return {Support.DOUBLE: (0.0, end)}
-        landing = self._landing(np.linalg.norm(foot - foot[-1], axis=1))
+        landing = self._landing(np.linalg.norm(foot - foot[-1], axis=1), max(STILL, scatter))
         if end - landing < LEAST_SHARE * end:
             return {Support.SINGLE: (0.0, end)}
         return {Support.SINGLE: (0.0, landing), Support.DOUBLE: (landing, end)}
 
-    def _landing(self, distance: Array) -> float:
+    def _landing(self, distance: Array, still: float) -> float:
         """Estimate when a foot lands from its distance to its last place (T,) [m], a parabola where a swing ends at rest."""
-        last = int(np.flatnonzero(distance >= STILL)[-1])
-        before = max(last - 2, 0)
-        near, far = np.sqrt(distance[[last, before]])
-        late = 0.0 if far <= near else near * (self.t[last] - self.t[before]) / (far - near)
-        return float(self.t[np.argmin(np.abs(self.t - (self.t[last] + late)))])
+        last = int(np.flatnonzero(distance >= still)[-1])
+        begin = int(np.flatnonzero(distance[: last + 1] > FAR * still)[-1:].sum())
+        begin = max(min(begin, last - 2), 0)
+        slope, at_zero = np.polyfit(self.t[begin : last + 1], np.sqrt(distance[begin : last + 1]), 1)
+        landing = max(self.t[last], -at_zero / slope) if slope < 0.0 else self.t[last]
+        return float(self.t[np.argmin(np.abs(self.t - landing))])
+
+
+def estimate_noise(samples: Array) -> Array:
+    """Return the standard deviation (n,) of noise and rounding in samples (T, n) of a smooth motion.
+
+    Fourth differences of equal steps contain hardly anything else; their median is that of most samples.
+    """
+    if len(samples) < 2 * LEAST_ROWS:
+        return np.zeros(samples.shape[1])
+    differences = np.median(np.abs(np.diff(samples, 4, axis=0)), axis=0)
+    return np.asarray(differences / (math.sqrt(70.0) * MEDIAN))
+
+
+def count_swings(heights: Array, lifted: float) -> int:
+    """Return how often the right foot or the left one swings, from the height (T,) of the right foot above the left one [m]."""
+    signs = np.sign(heights[np.abs(heights) > lifted])
+    return 1 + int(np.count_nonzero(np.diff(signs)))
 
 
 class FreeParts(NamedTuple):
@@ -161,14 +206,52 @@ def read_motion(angles: JointAngles, body: Body) -> RecordedMotion:
         raise InputError(f"{angles.owner} has no angles of {', '.join(needed)}")
     if len(angles.t) < LEAST_ROWS:
         raise InputError(f"{angles.owner} has {len(angles.t)} rows; a motion needs {LEAST_ROWS}")
-    if not (np.isfinite(angles.t).all() and np.diff(angles.t).min() > 0.0):
-        raise InputError(f"{angles.owner}: times must ascend")
+    check_times(angles)
     columns = dict(zip(angles.joints, angles.q.T, strict=True))
     for name in JOINTS:
         if name in columns and not np.isfinite(columns[name]).all():
             raise InputError(f"{angles.owner}: an angle of {name} is missing")
+    check_angles(angles)
     columns |= {name: np.full(len(angles.t), RESTING_ARM_ANGLES[name]) for name in missing}
     q = np.column_stack([columns[name] for name in JOINTS])
     motion = RecordedMotion(body=body, t=angles.t - angles.t[0], q=q, held=tuple(missing))
-    heights = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))[:, 2]
+    heights = motion.right_foot(motion.t)[:, 2]
+    steps = count_swings(heights, LIFTED + SCATTER * float(estimate_noise(heights[:, None])[0]))
+    if steps > 1:
+        raise InputError(
+            f"{angles.owner} shows {steps} steps; one is judged: cut it from the lift-off of a foot to that of the other"
+        )
     return motion.mirror_image() if -heights.min() > max(heights.max(), LIFTED) else motion
+
+
+def check_times(angles: JointAngles) -> None:
+    """Raise InputError unless times ascend, in seconds."""
+    if not np.isfinite(angles.t).all():
+        raise InputError(f"{angles.owner}: a time is missing")
+    periods = np.diff(angles.t)
+    row = int(periods.argmin())
+    if not periods[row] > 0.0:
+        before, after = angles.t[row : row + 2]
+        raise InputError(
+            f"{angles.owner}: times must ascend, got {after:g} s after {before:g} s; remove one of the rows"
+        )
+    if (period := float(np.median(periods))) > LARGEST_PERIOD_S:
+        raise InputError(
+            f"{angles.owner}: rows are {period:g} s apart, at most {LARGEST_PERIOD_S:g} s are allowed. Milliseconds? "
+            "Name their column 't [ms]'"
+        )
+
+
+def check_angles(angles: JointAngles) -> None:
+    """Raise InputError for angles that are degrees, or jump by whole turns."""
+    row, column = np.unravel_index(np.nanargmax(np.abs(angles.q)), angles.q.shape)
+    name, largest = angles.joints[column], angles.q[row, column]
+    if abs(largest) > LARGEST_ANGLE:
+        raise InputError(
+            f"{angles.owner}: {name} is {largest:.4g} rad at {angles.t[row]:g} s. Degrees? Name the column '{name} [deg]'"
+        )
+    if abs(largest) > math.pi:
+        raise InputError(
+            f"{angles.owner}: {name} is {largest:.4g} rad at {angles.t[row]:g} s, beyond half a turn. Wrapped? Add or subtract "
+            "2 pi where it jumps, so that angles are continuous and within +-pi"
+        )
