@@ -103,35 +103,41 @@ def _make_cost_columns(axis: str, title: str, form: str) -> tuple[Column, ...]:
     )
 
 
+def count_within(target: float, comparison: Comparison, solver: SolverRuns) -> int:
+    """Return the number of runs that end within a gap."""
+    return comparison.count_reached(solver, target)
+
+
+RUNS = Column("runs", lambda _, solver: len(solver.records), "d")
+FEASIBLE = Column("feasible", lambda _, solver: len(solver.feasible), "share")
+MEDIAN_GAP = Column("median gap", lambda comparison, solver: comparison.gap(solver.median_cost), "gap")
+BEST_GAP = Column("best gap", lambda comparison, solver: comparison.gap(min(solver.costs)), "gap")
+WITHIN = Column("within 1 %", partial(count_within, TARGETS[0]), "share")
+EVALUATIONS = Column("median evaluations", compute_median_evaluations, "count")
+TIME = Column("median time [s]", partial(compute_of_records, median, "solve"), ".3g")
+# On the first screen of a report.
+MAIN = (RUNS, FEASIBLE, MEDIAN_GAP, BEST_GAP, WITHIN, EVALUATIONS, TIME)
+PRINTED = (FEASIBLE, MEDIAN_GAP, BEST_GAP, WITHIN, EVALUATIONS, TIME)  # in a terminal of 80 columns
 # Expected running time: cost of all runs until the target, divided by the number that reached it; infinite if none did.
 EVALUATIONS_TO = _make_cost_columns("evaluations", "evaluations", "count")
 SECONDS_TO = _make_cost_columns("seconds", "seconds", ".3g")
-# On the first screen of a report.
-MAIN = (
-    Column("feasible", lambda _, solver: len(solver.feasible), "share"),
-    Column("median gap", lambda comparison, solver: comparison.gap(solver.median_cost), "gap"),
-    Column("best gap", lambda comparison, solver: comparison.gap(min(solver.costs)), "gap"),
-    EVALUATIONS_TO[0],
-    Column("time [s]", partial(compute_of_records, median, "solve"), ".3f"),
-    Column("guaranteed", count_guaranteed, "share"),
-)
-PRINTED = (*MAIN[:2], *MAIN[3:])  # in a terminal of 80 columns
-# Claims of the solvers, and what the judge finds with the exact functions.
+# What the solvers report, and what the judge finds with the exact functions.
 JUDGEMENT = (
-    Column("runs", lambda _, solver: len(solver.records), "d"),
-    Column("claimed", count_claimed, "share"),
-    MAIN[0],
+    RUNS,
+    Column("reported feasible", count_claimed, "share"),
+    FEASIBLE,
     Column("feasible between samples", count_dense_feasible, "share"),
-    Column("best claimed", find_best_claim, "objective"),
+    Column("guaranteed", count_guaranteed, "share"),
+    Column("best reported", find_best_claim, "objective"),
     Column("best", partial(compute_of_feasible, min), "objective"),
     Column("median", partial(compute_of_feasible, median), "objective"),
     Column("worst", partial(compute_of_feasible, max), "objective"),
 )
 EFFORT = (
-    Column("evaluations", compute_median_evaluations, "count"),
+    EVALUATIONS,
     Column("build [s]", partial(compute_of_records, max, "build"), ".2f"),
     Column("compile [s]", partial(compute_of_records, max, "compile"), ".2f"),
-    MAIN[4],
+    TIME,
 )
 ALL = tuple(dict.fromkeys((*JUDGEMENT, *MAIN, *EFFORT, *EVALUATIONS_TO, *SECONDS_TO)))
 
@@ -150,5 +156,5 @@ def format_rows(
     """Return header and rows of text, a row for each solver; a column in which nothing is known is left out."""
     cells = {c.title: [c.format_cell(comparison, solver) for solver in comparison.solvers] for c in columns}
     nonempty = {title: texts for title, texts in cells.items() if set(texts) != {"-"}}
-    names = [solver.name for solver in comparison.solvers]
+    names = [solver.title for solver in comparison.solvers]
     return ("solver", *nonempty), list(zip(names, *nonempty.values(), strict=True))

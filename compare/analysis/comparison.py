@@ -19,7 +19,7 @@ from compare.analysis.record_statistics import (
     make_curve,
     tie,
 )
-from compare.analysis.units import format_percent, with_unit
+from compare.analysis.units import format_percent, name_solver, with_unit
 from compare.study.record import RunRecord, find_best, group_by
 from compare.study.references import BETTER, Reference, find_reference
 from compare.study.task import GRADIENT_SOLVERS, SOURCE
@@ -37,6 +37,11 @@ class SolverRuns:
     name: str
     records: tuple[RunRecord, ...]  #: ascending in the run's number
     curves: tuple[Curve, ...]
+
+    @property
+    def title(self) -> str:
+        """Name as the field writes it."""
+        return name_solver(self.name)
 
     @cached_property
     def costs(self) -> tuple[float, ...]:
@@ -104,8 +109,13 @@ class Comparison:
     @property
     def better(self) -> RunRecord | None:
         """Best run if it is better than the shipped best known value; else None."""
-        best = self.best
-        return best if best is not None and self.known.is_beaten_by(best.verdict.objective, self.objective) else None
+        best, known = self.best, self.known.objective
+        is_better = (
+            best is not None
+            and known is not None
+            and compute_gap(best.verdict.objective, known, self.objective) < -BETTER
+        )
+        return best if is_better else None
 
     def value(self, cost: float) -> float:
         """Return a cost as an objective in the problem's sense."""
@@ -139,15 +149,17 @@ class Comparison:
                 results[pair.first] = -pair.is_significant
         return results
 
-    def count_reached(self, solver: SolverRuns) -> int:
-        """Return the number of runs of a solver that reach the best known value."""
-        return sum(len(curve.gap) > 0 and curve.gap.min() <= FOUND for curve in solver.curves)
+    def count_reached(self, solver: SolverRuns, target: float = FOUND) -> int:
+        """Return the number of runs of a solver that end within a gap, by default at the best known value."""
+        return sum(self.gap(cost) <= target for cost in solver.costs)
 
     def format_gap(self, gap: float | None) -> str:
-        """Format a gap in percent, 0 below ``SMALLEST_GAP``, or in the objective's unit from a value near zero."""
-        if gap is None or not math.isfinite(gap) or not is_zero(self.reference):
-            return format_percent(0.0 if gap is not None and abs(gap) < SMALLEST_GAP else gap)
-        return f"below {ZERO:g}" if abs(gap) < ZERO else with_unit(gap, self.objective.unit, ".2g")
+        """Format a gap in percent, or in the objective's unit from a value near zero; ``FOUND`` is the least one shown."""
+        if gap is None or not math.isfinite(gap) or gap == 0.0:
+            return "-" if gap is None or not math.isfinite(gap) else "0 %"
+        if is_zero(self.reference):
+            return f"< {ZERO:g}" if abs(gap) < ZERO else with_unit(gap, self.objective.unit, ".2g")
+        return f"< {100 * FOUND:.4f} %" if abs(gap) < FOUND else format_percent(gap)
 
     def gap(self, cost: float) -> float:
         """Return the distance of a cost from the best known objective, see ``compute_gap``; 0 if better within the tolerance."""

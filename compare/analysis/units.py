@@ -14,6 +14,22 @@ SIX_DECIMALS = ".6f"
 SMALL, LARGE = 5e-7, 1e12  # six decimals show zero for less, and digits without a meaning for more
 
 
+# Names of solvers as the field writes them.
+SOLVERS = {
+    **{name: name.upper() for name in ("ipopt", "slsqp", "pso", "ga", "aco", "de", "abc", "sa", "es")},
+    "cma": "CMA-ES",
+    "lshade": "L-SHADE",
+    "random": "random search",
+}
+
+
+def name_solver(name: str) -> str:
+    """Return the name of a solver as the field writes it: ``PSO``, ``PSO-tuned``, ``GA+IPOPT``; others as they are."""
+    words = name.split("+")
+    heads = [word.partition("-") for word in words]
+    return "+".join(SOLVERS.get(head, head) + dash + rest for head, dash, rest in heads)
+
+
 def format_number(value: float, digits: str) -> str:
     """Format a number; a value rounded to zero has no sign."""
     if isinstance(value, int):
@@ -32,12 +48,14 @@ def with_unit(value: float | None, unit: str, digits: str = SIX_DECIMALS) -> str
 
 
 def format_percent(share: float | None) -> str:
-    """Format a share in percent, with four decimals or in scientific notation."""
+    """Format a share in percent with two digits, in scientific notation below 0.0001 %."""
     if share is None or not math.isfinite(share):
         return "-"
-    if abs(share) < ROUNDING:
-        return "0.0000 %"
-    return f"{100 * share:z.4f} %" if abs(share) >= 5e-7 else f"{100 * share:.1e} %"
+    percent = 0.0 if abs(share) < ROUNDING else float(f"{100 * share:.1e}")
+    if percent and not 5e-5 <= abs(percent) < 1e6:
+        return f"{percent:.1e} %"
+    decimals = max(0, 1 - math.floor(math.log10(abs(percent)))) if percent else 0
+    return f"{percent:.{decimals}f} %"
 
 
 def make_heading(words: str, unit: str) -> str:

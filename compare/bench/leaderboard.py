@@ -11,7 +11,7 @@ from compare.analysis.comparison import Comparison, compare_problems, index_solv
 from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
 from compare.bench.baseline import EVALUATIONS, get_reference, load_baseline
-from compare.drawing.comparison_figures import make_suite_ecdf_charts
+from compare.drawing.comparison_figures import make_ecdf_charts
 from compare.report.document import Document, Section, Table, make_text_table
 from compare.report.provenance import TERMS
 from compare.report.study_sections import make_chart_figure, make_wins_table
@@ -101,7 +101,7 @@ def make_leaderboard_page(
                 "gaitbench-runtime",
                 "Share of all triples of instance, run and target solved within a number of evaluations per variable; "
                 "31 targets, from 100 % to 1e-4 % above the best known.",
-                make_suite_ecdf_charts(board.comparisons),
+                make_ecdf_charts(board.comparisons, per_variable=True),
             ),
             *(() if solver is None else (make_wins_table(board.comparisons, solver),)),
             Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),

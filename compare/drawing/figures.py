@@ -30,13 +30,16 @@ COLOURS = {
     "aco": "#009E73",
     "aco-grid": "#CC79A7",
     "cma": "#E69F00",
+    "cma-es": "#E69F00",
     "de": "#56B4E9",
 }
 LINES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D")
 # Ink of axes and text in figures inside a page: replaced by the page's own colour there.
 INK = "#000000"
+LEGS = {"left": "#7A5CC0", "right": "#A07D1C", "trunk": INK}  # unlike those of solvers
 LEGEND_ROW_IN = 0.19
+SUPERSCRIPTS = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,9 +58,9 @@ def assign_looks(names: Collection[str]) -> dict[str, Look]:
     """
     used: Counter[str] = Counter()
     looks: dict[str, Look] = {}
-    for name in sorted({*names, *_STUDIED.get()}, key=lambda name: (name not in COLOURS, name)):
+    for name in sorted({*names, *_STUDIED.get()}, key=lambda name: (name.lower() not in COLOURS, name)):
         # A polished search has its search's colour; an unknown solver gets the least used one.
-        usual = COLOURS.get(name) or COLOURS.get(name.split("+")[0])
+        usual = COLOURS.get(name.lower()) or COLOURS.get(name.lower().split("+")[0])
         colour = usual or min((c for c in COLOURS.values() if c != INK), key=lambda c: used[c])
         kind = used[colour]
         used[colour] += 1
@@ -112,13 +115,9 @@ def add_legend_below(figure: Figure) -> None:
 
 
 def format_power_of_ten(value: float) -> str:
-    """Format a power of ten, for example 10\u207b\u2076; plain from 0.1 to 1000."""
-    if 0.09 < value < 1001.0:
-        return f"{value:g}"
-    exponent = round(math.log10(value)) if value > 0.0 else 0
-    return "10" + str(exponent).translate(
-        str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
-    )
+    """Format a power of ten: 10\u207b\u2074, 1, 10, 10\u00b2."""
+    exponent = round(math.log10(value))
+    return ("1", "10")[exponent] if exponent in (0, 1) else "10" + str(exponent).translate(SUPERSCRIPTS)
 
 
 def save_figure(figure: Figure, path: Path) -> Path:

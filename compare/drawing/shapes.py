@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 LETTER, LINE, FONT = 6.2, 18, 12  # width of a letter, height of a line of text, and of its letters [pixels]
 PIXELS_PER_INCH = 108
 POINTS = 72 / PIXELS_PER_INCH  # of a pixel
-COLUMN = 3.4 * PIXELS_PER_INCH  # width of a printed column
 ALIGNED = {"start": "left", "middle": "center", "end": "right"}
 
 
@@ -33,6 +32,7 @@ class Stroke:
     dash: str = ""  #: lengths of dashes and of gaps
     opacity: float = 1.0
     filled: bool = False
+    note: str = ""  #: which a page shows at the pointer
 
     def move(self, right: float, down: float) -> Stroke:
         """Return the lines elsewhere."""
@@ -45,7 +45,8 @@ class Stroke:
         width = "" if self.width == 1.0 or self.filled else f' stroke-width="{self.width:g}"'
         dash = f' stroke-dasharray="{self.dash}"' if self.dash else ""
         opacity = "" if self.opacity == 1.0 else f' opacity="{self.opacity:.2g}"'
-        return f'<path d="{path}" {look}{width}{dash}{opacity}/>'
+        note = f"<title>{escape(self.note)}</title>" if self.note else ""
+        return f'<path d="{path}" {look}{width}{dash}{opacity}>{note}</path>'
 
     def plot(self, axes: Axes) -> None:
         """Plot into axes in pixels."""
@@ -96,10 +97,12 @@ class Drawing:
     width: float
     height: float
     shapes: Sequence[Stroke | Label]
+    time: tuple[float, float, float, float] | None = None  #: of an axis of time: its ends in pixels and in seconds
 
     def to_svg(self) -> str:
         """Return an SVG file."""
-        view = f'xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width:g} {self.height:.0f}"'
+        time = "" if self.time is None else f' data-time="{" ".join(f"{end:.4g}" for end in self.time)}"'
+        view = f'xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width:g} {self.height:.0f}"{time}'
         body = "\n".join(shape.to_svg() for shape in self.shapes)
         return f'<svg {view} font-family="sans-serif" font-size="{FONT}">\n{body}\n</svg>\n'
 
@@ -115,8 +118,9 @@ class Drawing:
         return figure
 
 
-def place_drawings(drawings: Sequence[Drawing], columns: int) -> Drawing:
+def place_drawings(drawings: Sequence[Drawing], columns: int = 2) -> Drawing:
     """Return drawings row by row in columns of the first one's size."""
+    columns = min(columns, len(drawings))
     width, height = drawings[0].width, max(drawing.height for drawing in drawings)
     shapes = [
         shape.move(width * (k % columns), height * (k // columns))
@@ -139,3 +143,18 @@ MARKERS = {
     "^": make_marker(3, 3.8, -np.pi / 2.0),
     "D": make_marker(4, 3.6, 0.0),
 }
+
+
+def draw_legend(
+    entries: Sequence[tuple[str, str, str]], left: float, top: float, width: float
+) -> tuple[list[Stroke | Label], float]:
+    """Draw samples of lines (words, colour, dash) row by row within a width, and return the shapes and their height."""
+    shapes: list[Stroke | Label] = []
+    x, y = left, top + 8
+    for words, colour, dash in entries:
+        if x + 46 + LETTER * len(words) > width and x > left:
+            x, y = left, y + LINE
+        shapes.append(Stroke(lines=[np.array([[x, y], [x + 26, y]])], colour=colour, width=2.0, dash=dash))
+        shapes.append(Label(x=x + 31, y=y + 4, text=words, anchor="start"))
+        x += 46 + LETTER * len(words)
+    return shapes, y - top + 10

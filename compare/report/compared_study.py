@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from compare.analysis.columns import format_rows
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import write_headlines
+from compare.analysis.units import name_solver
 from compare.drawing.charts import plot_charts
 from compare.drawing.comparison_figures import make_final_gap_charts
 from compare.drawing.figures import share_looks
@@ -65,7 +66,7 @@ class ComparedStudy:
 
     def plot(self, problem: str | None = None) -> Figure:
         """Plot the final gap of every run on a problem, by default on the first one."""
-        with share_looks({record.solver for record in self.records}):
+        with share_looks({name_solver(record.solver) for record in self.records}):
             return plot_charts(make_final_gap_charts(self._find(problem)))
 
     def latex(self, decimals: int | None = None) -> str:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from compare.analysis.units import format_number
+from compare.drawing.figures import render_svg
+from compare.drawing.shapes import Drawing, place_drawings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Plot
-
-    from compare.drawing.shapes import Drawing
 
 Value = str | float | int | bool | None
 """Content of a cell; None for an empty one."""
@@ -46,17 +47,33 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Figure:
-    """A drawing of shapes or of Matplotlib, the stem of its SVG file, and its caption."""
+    """Drawings next to each other, or a figure of Matplotlib; the stem of its SVG file; its caption."""
 
     name: str
     caption: str
-    drawing: Drawing | Plot | Callable[[], Drawing | Plot]  #: or the function that draws it
-    #: From which the page draws an interactive figure, if its scripts have an entry for ``kind``; else the drawing stays
-    data: Mapping[str, Any] | None = None
+    drawing: Sequence[Drawing] | Plot | Callable[[], Sequence[Drawing] | Plot]  #: or the function that draws it
+    gaits: Mapping[str, Any] | None = None  #: which a page plays in place of the first drawing
 
-    def draw(self) -> Drawing | Plot:
-        """Return the drawing."""
+    @cached_property
+    def drawn(self) -> Sequence[Drawing] | Plot:
+        """The drawing."""
         return self.drawing() if callable(self.drawing) else self.drawing
+
+    @cached_property
+    def panels(self) -> list[str]:
+        """SVG of each drawing, for a page."""
+        if isinstance(self.drawn, Sequence):
+            return [drawing.to_svg() for drawing in self.drawn]
+        return [render_svg(self.drawn)]
+
+    def render(self) -> str:
+        """Return one SVG file."""
+        several = isinstance(self.drawn, Sequence) and len(self.drawn) > 1
+        return place_drawings(self.drawn).to_svg() if several else self.panels[0]  # type: ignore[arg-type]
+
+    def plot(self) -> Plot:
+        """Return a figure of Matplotlib."""
+        return place_drawings(self.drawn).to_figure() if isinstance(self.drawn, Sequence) else self.drawn
 
 
 @dataclass(frozen=True)
@@ -73,6 +90,7 @@ class Section:
     title: str
     parts: Sequence[Part]
     folded: bool = False  #: the page shows the heading, which opens the parts
+    half: bool = False  #: two of them stand next to each other on a wide page
 
 
 Part = str | Prose | Table | Figure | Section

@@ -1,14 +1,13 @@
 """Gaits that a page draws itself in 3-D, in a report or alone."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from compare.drawing.charts import round_digits
 from compare.drawing.figures import assign_looks
 from compare.drawing.gait_figure import GaitCurves, draw_gaits, prepare_gait
 from compare.report.document import Document, Figure
@@ -19,35 +18,27 @@ from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.formulation.display import Skeleton
 
 MOST_FRAMES, MOST_SIMULATED = 41, 601  # of a gait; the page interpolates between them
-CAPTION = "Left blue, right orange; the support polygon green, the zero-moment point pink, the centre of mass in ink."
 
 
-def describe_gaits(
-    gaits: Mapping[str, GaitCurves], most_frames: int = MOST_FRAMES, *, curves: bool = True
-) -> dict[str, Any] | None:
-    """Return the skeletons of gaits over time in millimetres and milliseconds, with power and margin; None without any."""
+def describe_gaits(gaits: Mapping[str, GaitCurves], most_frames: int = MOST_FRAMES) -> dict[str, Any] | None:
+    """Return the skeletons of gaits over time in millimetres and milliseconds; None without any."""
     looks = assign_looks(list(gaits))
     shown = [
-        _describe_gait(
-            name, gait if curves else replace(gait, power=None, margin=None), looks[name].colour, most_frames
-        )
+        _describe_gait(name, gait.skeleton, looks[name].colour, most_frames)
         for name, gait in gaits.items()
         if gait.skeleton is not None
     ]
-    return {"kind": "gaits", "gaits": shown} if shown else None
+    return {"gaits": shown} if shown else None
 
 
-def _describe_gait(name: str, gait: GaitCurves, colour: str, most_frames: int) -> dict[str, Any]:
-    skeleton = gait.skeleton
-    assert skeleton is not None
-    frames = np.unique(np.linspace(0, len(gait.t) - 1, most_frames).round().astype(int))
+def _describe_gait(name: str, skeleton: Skeleton, colour: str, most_frames: int) -> dict[str, Any]:
+    frames = np.unique(np.linspace(0, len(skeleton.t) - 1, most_frames).round().astype(int))
     points = {"com": skeleton.com, "zmp": skeleton.zmp}
-    curves = {"power": gait.power, "margin": gait.margin}
     return {
         "name": name,
         "colour": colour,
         "planar": skeleton.planar,
-        "t": round_digits(1000.0 * gait.t[frames]),
+        "t": [round(1000.0 * t, 1) for t in skeleton.t[frames].tolist()],
         "ground": _to_mm(skeleton.ground),
         "limbs": [{"side": limb.side, "points": _to_mm(limb.points[frames])} for limb in skeleton.limbs],
         "soles": [
@@ -55,7 +46,6 @@ def _describe_gait(name: str, gait: GaitCurves, colour: str, most_frames: int) -
             for s in skeleton.soles
         ],
         **{key: None if place is None else _to_mm(place[frames]) for key, place in points.items()},
-        **{key: None if curve is None else round_digits(curve[frames]) for key, curve in curves.items()},
     }
 
 
@@ -97,6 +87,5 @@ def _make_page(title: str, name: str, gait: GaitCurves) -> GaitPage:
     data = describe_gaits({name: gait}, MOST_SIMULATED)
     if data is None:
         raise InputError(f"{title}: this problem has no skeleton to draw")
-    drawing = draw_gaits({name: gait})
-    figure = Figure(name="gait", caption=CAPTION, drawing=drawing, data=data)
-    return GaitPage(render_page(Document(title=title, parts=[figure]), [drawing.to_svg()]))
+    figure = Figure(name="gait", caption="", drawing=draw_gaits({name: gait}), gaits=data)
+    return GaitPage(render_page(Document(title=title, parts=[figure])))

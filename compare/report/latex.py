@@ -4,16 +4,16 @@ import math
 from collections.abc import Sequence
 from statistics import mean, median, stdev
 
-from compare.analysis.comparison import SMALLEST_GAP, Comparison, index_solvers
+from compare.analysis.comparison import Comparison, index_solvers
 from compare.analysis.overview import count_wins, list_user_solvers, rank_over_problems
 from compare.analysis.record_statistics import SIGNIFICANT
-from compare.analysis.units import join_words, make_heading, with_unit
+from compare.analysis.units import join_words, make_heading, name_solver, with_unit
 from nlp_gait.files import make_file_name
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
-HEADER = ("solver", "feasible", "best", "median", "mean", "std.", "worst", "gap", "$p$")
+HEADER = ("solver", "feasible", "best", "median", "mean", "std.", "worst", "median gap", "$p$")
 SPECIAL = str.maketrans(
-    {c: rf"\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}", "\\": r"\textbackslash{}"}
+    {c: rf"\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}", "\\": r"\textbackslash{}", "<": "$<$"}
 )
 UNKNOWN = "--"
 # Of a solver than which the subject is significantly better, from which it does not differ, or than which it is worse.
@@ -27,20 +27,22 @@ def format_latex_table(comparison: Comparison, decimals: int | None = None) -> s
     Objectives have so many decimals, or else as many as different medians need to differ.
     """
     decimals = _choose_decimals(comparison) if decimals is None else decimals
-    p_values = {pair.second: pair.rank_sum for pair in comparison.pairs if pair.first == comparison.solvers[0].name}
+    first = comparison.solvers[0]
+    p_values = {pair.second: pair.rank_sum for pair in comparison.pairs if pair.first == first.name}
+    is_best = bool(p_values) and all(p < SIGNIFICANT for p in p_values.values())
     rows = []
     for solver in comparison.solvers:
         values = sorted((comparison.value(cost) for cost in solver.feasible), reverse=comparison.objective.sign < 0)
         deviation = stdev(values) if len(values) > 1 else None
         numbers = (values[0], median(values), mean(values), deviation, values[-1]) if values else 5 * (None,)
         cells = [_format_number(number, decimals) for number in numbers]
-        if solver.name in comparison.leaders and values:
+        if solver is first and is_best and values:
             cells[1] = rf"\textbf{{{cells[1]}}}"
         p = p_values.get(solver.name)
         shown_p = UNKNOWN if p is None else "$<$0.001" if p < 0.001 else f"{p:.3f}"
-        gap = _format_gap(comparison.gap(solver.median_cost))
-        rows.append((escape_latex(solver.name), f"{len(values)}/{len(solver.records)}", *cells, gap, shown_p))
-    return _format_table(_write_caption(comparison), make_file_name(comparison.problem), HEADER, rows)
+        gap = _format_gap(comparison, comparison.gap(solver.median_cost))
+        rows.append((escape_latex(solver.title), f"{len(values)}/{len(solver.records)}", *cells, gap, shown_p))
+    return _format_table(_write_caption(comparison, is_best), make_file_name(comparison.problem), HEADER, rows)
 
 
 def format_latex_overview(comparisons: Sequence[Comparison]) -> str:
@@ -55,43 +57,28 @@ def format_latex_overview(comparisons: Sequence[Comparison]) -> str:
     rows = []
     for comparison, solvers in zip(comparisons, by_name, strict=True):
         marks = {name: MARKS[result] for name, result in comparison.compare_with_others(subject).items()}
-        cells = [
-            f"{_format_gap(comparison.gap(solvers[name].median_cost))} {marks.get(name, '')}".strip()
-            if name in solvers
-            else UNKNOWN
-            for name in names
-        ]
+        gaps = {name: _format_gap(comparison, comparison.gap(s.median_cost)) for name, s in solvers.items()}
+        cells = [f"{gaps.get(name, UNKNOWN)} {marks.get(name, '')}".strip() for name in names]
         rows.append((escape_latex(comparison.problem), *cells))
     scores = {score.other: f"{score.wins}/{score.losses}/{score.ties}" for score in count_wins(comparisons, subject)}
     rows.append((r"\midrule $+$/$-$/$=$", *(scores.get(name, UNKNOWN) for name in names)))
     rows.append(("mean rank", *(f"{ranks[name]:.2f}" if name in ranks else UNKNOWN for name in names)))
     caption = (
-        f"Median gap to the best known value. {subject} is significantly better ($+$), worse ($-$) or not different ($=$): "
-        f"two-sided rank-sum test at {SIGNIFICANT:g}, Holm-corrected over all pairs on the problem. "
+        f"Median gap to the best known value. {name_solver(subject)} is significantly better ($+$), worse ($-$) or not "
+        f"different ($=$): two-sided rank-sum test at {SIGNIFICANT:g}, Holm-corrected over all pairs on the problem. "
         "Ranks are those of the medians, of solvers that ran on all problems."
     )
     text = escape_latex(caption).replace(r"\$", "$")
-    return _format_table(text, "problems", ("problem", *map(escape_latex, names)), rows)
+    return _format_table(text, "problems", ("problem", *map(escape_latex, map(name_solver, names))), rows)
 
 
 def _format_table(caption: str, label: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     head, *lines = [" & ".join(row) + r" \\" for row in (header, *rows)]
-    return "\n".join(
-        [
-            r"\begin{table}",
-            r"\centering\small\setlength{\tabcolsep}{4pt}",
-            rf"\caption{{{caption}}}",
-            rf"\label{{tab:{label}}}",
-            rf"\begin{{tabular}}{{l{'r' * (len(header) - 1)}}}",
-            r"\toprule",
-            head,
-            r"\midrule",
-            *lines,
-            r"\bottomrule",
-            r"\end{tabular}",
-            r"\end{table}",
-            "",
-        ]
+    body = "\n".join([r"\toprule", head, r"\midrule", *lines, r"\bottomrule"])
+    return (
+        "\\begin{table}\n\\centering\\small\\setlength{\\tabcolsep}{4pt}\n"
+        f"\\caption{{{caption}}}\n\\label{{tab:{label}}}\n"
+        f"\\begin{{tabular}}{{l{'r' * (len(header) - 1)}}}\n{body}\n\\end{{tabular}}\n\\end{{table}}\n"
     )
 
 
@@ -109,40 +96,35 @@ def escape_latex(text: str) -> str:
 
 
 def describe_run_counts(comparison: Comparison) -> str:
-    """Return for example "n = 20 runs of each solver, at most 10,000 evaluations of a search"."""
+    """Return for example "20 runs of each solver, at most 10,000 evaluations of a search"."""
     runs = sorted({len(solver.records) for solver in comparison.solvers})
     stops = [record.inputs.stop for record in comparison.records]
     budgets = sorted({stop["evaluations"] for stop in stops if "evaluations" in stop})
     count = " to ".join(map(str, dict.fromkeys((runs[0], runs[-1]))))
     budget = f", at most {join_words(f'{budget:,}' for budget in budgets)} evaluations of a search" if budgets else ""
-    return f"n = {count} runs of each solver{budget}"
+    return f"{count} run{'s' * (runs[-1] > 1)} of each solver{budget}"
 
 
-def _write_caption(comparison: Comparison) -> str:
+def _write_caption(comparison: Comparison, is_best: bool) -> str:
     objective = comparison.objective
     gap = "No feasible point is known"
     if math.isfinite(comparison.reference):
         best_known = with_unit(comparison.reference, objective.unit)
-        gap = f"Gap: distance of the median from the best known value, {best_known} ({comparison.known.source})"
+        gap = f"Median gap: distance of the median of all runs from {best_known} ({comparison.known.source})"
     sentences = [
-        f"{make_heading(objective.name, objective.unit)} on {comparison.problem}, to be {objective.sense}d: "
+        f"{make_heading(objective.name.replace('_', ' '), objective.unit)} on {comparison.problem}, to be {objective.sense}d: "
         f"{describe_run_counts(comparison)}",
         "Best to worst are over the feasible runs",
         gap,
-        "p: two-sided rank-sum test over all runs against the first solver, Holm-corrected over all pairs",
-        f"Bold: the first solver and those that do not differ from it at {SIGNIFICANT:g}",
+        f"p: two-sided rank-sum test over all runs against {comparison.solvers[0].title}, Holm-corrected over all pairs",
+        *([f"Bold: significantly better than all others at {SIGNIFICANT:g}"] if is_best else []),
     ]
     return ". ".join(map(escape_latex, sentences)) + "."
 
 
-def _format_gap(gap: float) -> str:
-    """Return a gap as a power of ten with two digits."""
-    if not math.isfinite(gap):
-        return "infeasible"
-    if gap < SMALLEST_GAP:
-        return "$<10^{-8}$" if gap > 0.0 else "0"
-    digits, exponent = f"{gap:.1e}".split("e")
-    return rf"${digits}\cdot 10^{{{int(exponent)}}}$"
+def _format_gap(comparison: Comparison, gap: float) -> str:
+    """Return a gap as the report shows it."""
+    return escape_latex(comparison.format_gap(gap)) if math.isfinite(gap) else "infeasible"
 
 
 def _format_number(value: float | None, decimals: int) -> str:

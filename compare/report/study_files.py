@@ -6,12 +6,9 @@ from pathlib import Path
 
 from compare.analysis.comparison import Comparison
 from compare.analysis.record_statistics import TARGETS
-from compare.drawing.charts import draw_charts
 from compare.drawing.figures import save_figure
-from compare.drawing.shapes import COLUMN, Drawing
 from compare.report.document import Document, Figure, iterate_leaves
 from compare.report.latex import describe_run_counts, escape_latex, format_latex_overview, format_latex_table
-from compare.report.study_sections import FIGURES
 from compare.study.record import COLUMNS, JUDGED, list_variables, make_row
 from nlp_gait.files import format_csv, make_file_name, replace_nan, write_text
 
@@ -20,6 +17,8 @@ TableRows = Sequence[Sequence[object]]
 
 MEASURED = ("n", "budget", "gap", "equivalent_evaluations")
 COSTS = ("evaluations", "seconds")
+# What the figures show that have no caption on the page, where a sentence and a legend are next to them.
+CAPTIONS = {"final": "Final gap of each run; bar: median", "gaits": "Best gait from the side, later poses darker"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,8 +28,7 @@ class FurtherFiles:
     csv: bool = False  #: all runs, and the points of each problem; written again, too, where they exist already
     latex: bool = False  #: a table of each problem, and one of several problems and all solvers
     decimals: int | None = None  #: of objectives in these tables; None for as many as medians need to differ
-    #: figures of the report as PNG, and those of each problem one column wide as PDF with their captions in LaTeX
-    figures: bool = False
+    figures: bool = False  #: all figures of the report as PNG and as PDF, with their captions in LaTeX
 
     def write(self, folder: Path, comparisons: Sequence[Comparison], document: Document) -> list[Path]:
         """Write the files and return their paths; raises OutputError."""
@@ -40,20 +38,14 @@ class FurtherFiles:
             for name, rows in tables.items():
                 written.append(write_text(folder / f"{name}.csv", format_csv(replace_nan(rows))))
         if self.figures:
-            for part in iterate_leaves(document.parts):
-                if isinstance(part, Figure):
-                    drawing = part.draw()
-                    figure = drawing.to_figure() if isinstance(drawing, Drawing) else drawing
-                    written.append(save_figure(figure, folder / f"{part.name}.png"))
-        for comparison in comparisons:
-            stem = folder / make_file_name(comparison.problem)
-            if self.latex:
-                table = format_latex_table(comparison, self.decimals)
-                written.append(write_text(stem.with_name(f"{stem.name}-table.tex"), table))
-            if self.figures:
-                written += _write_figures(stem, comparison)
-        if self.latex and len(comparisons) > 1:
-            written.append(write_text(folder / "problems-table.tex", format_latex_overview(comparisons)))
+            figures = [part for part in iterate_leaves(document.parts) if isinstance(part, Figure)]
+            plots = [(figure.name, figure.plot()) for figure in figures]
+            written += [save_figure(plot, folder / f"{name}.{kind}") for name, plot in plots for kind in ("png", "pdf")]
+            written.append(write_text(folder / "figures.tex", _write_captions(figures, comparisons)))
+        if self.latex:
+            latex = {make_file_name(c.problem): format_latex_table(c, self.decimals) for c in comparisons}
+            latex |= {"problems": format_latex_overview(comparisons)} if len(comparisons) > 1 else {}
+            written += [write_text(folder / f"{name}-table.tex", table) for name, table in latex.items()]
         return written
 
 
@@ -90,16 +82,16 @@ def _make_point_tables(comparisons: Sequence[Comparison]) -> dict[str, TableRows
     return tables
 
 
-def _write_figures(stem: Path, comparison: Comparison) -> list[Path]:
-    """Write ``<problem>-<figure>.pdf`` for each figure, and ``<problem>-figures.tex`` with their captions."""
-    written, text = [], ""
-    for name, (compute, caption) in FIGURES.items():
-        figure = f"{stem.name}-{name}"
-        drawing = draw_charts(compute(comparison)[:1], width=COLUMN)
-        written.append(save_figure(drawing.to_figure(), stem.with_name(f"{figure}.pdf")))
-        words = f"{caption.removesuffix('.')}; {comparison.problem}, {describe_run_counts(comparison)}."
+def _write_captions(figures: Sequence[Figure], comparisons: Sequence[Comparison]) -> str:
+    """Return all figures in LaTeX, each with what it shows."""
+    text = ""
+    for figure in figures:
+        comparison = next((c for c in comparisons if figure.name.startswith(f"{make_file_name(c.problem)}-")), None)
+        words = figure.caption.removesuffix(".") or CAPTIONS.get(figure.name.rpartition("-")[2], figure.name)
+        if comparison is not None:
+            words += f"; {comparison.problem}, {describe_run_counts(comparison)}"
         text += (
-            f"\\begin{{figure}}\n\\centering\n\\includegraphics{{{figure}.pdf}}\n"
-            f"\\caption{{{escape_latex(words)}}}\n\\label{{fig:{figure}}}\n\\end{{figure}}\n"
+            f"\\begin{{figure}}\n\\centering\n\\includegraphics[width=\\linewidth]{{{figure.name}.pdf}}\n"
+            f"\\caption{{{escape_latex(words)}.}}\n\\label{{fig:{figure.name}}}\n\\end{{figure}}\n"
         )
-    return [*written, write_text(stem.with_name(f"{stem.name}-figures.tex"), text)]
+    return text

@@ -5,29 +5,31 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from compare.analysis.comparison import Comparison, compare_problems
-from compare.analysis.headline import MANY, write_headlines
+from compare.analysis.headline import MANY, write_overall_headline
+from compare.analysis.units import name_solver
 from compare.drawing.figures import share_looks
 from compare.judge import evaluate
-from compare.report.document import Document, Section, make_table_section
+from compare.report.document import Document, Prose, Section, make_table_section
 from compare.report.study_files import FurtherFiles
 from compare.report.study_sections import (
-    HOW,
     TESTS,
     list_convergence,
     list_costs,
     list_optimum,
     list_tests,
     load_gaits,
+    load_problem_or_none,
     make_folded_section,
     make_overview,
     make_problem_section,
     make_settings_section,
+    split_title,
 )
-from compare.report.writing import write_document
+from compare.report.writing import escape_markdown, write_document
 from compare.study.evidence import CheckedRecords, Exclusion, read_evidence
 from compare.study.record import RunRecord, load_gait
 from compare.study.record_files import RECORDS, name_group
-from compare.study.settings import Manifest, read_manifest
+from compare.study.settings import Manifest, Session, read_manifest
 from nlp_gait.files import make_file_name, replace_nan, write_json, write_text
 
 REPORT_ALONE = FurtherFiles()
@@ -45,7 +47,7 @@ def write_report(
 ) -> list[Path]:
     """Write the report with stored simulations, its figures as SVG, and further files; return all paths."""
     comparisons = compare_problems(records)
-    with share_looks({record.solver for record in records}):
+    with share_looks({name_solver(record.solver) for record in records}):
         document = make_study_document(comparisons, manifest, excluded)
         written = write_document(folder, document)
         return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons, document)]
@@ -79,14 +81,19 @@ def make_study_document(
 ) -> Document:
     """Return the document of a study, and of excluded records."""
     gaits = {comparison.problem: load_gaits(comparison) for comparison in comparisons}
+    problems = {comparison.problem: load_problem_or_none(comparison) for comparison in comparisons}
+    titles = {comparison.problem: split_title(comparison, problems[comparison.problem]) for comparison in comparisons}
     return Document(
-        title="Solvers on " + ", ".join(c.problem for c in comparisons),
-        headline=write_headlines(comparisons),
+        title=_write_title(list(titles.values())),
         parts=(
+            *_describe_latest(manifest.sessions),
             *_describe_progress(manifest, [r for c in comparisons for r in c.records], len(excluded)),
             *_list_excluded(excluded),
-            *(make_problem_section(c, gaits[c.problem]) for c in comparisons),
-            *((make_overview(comparisons),) if len(comparisons) >= MANY else ()),
+            *((write_overall_headline(comparisons), make_overview(comparisons)) if len(comparisons) >= MANY else ()),
+            *(
+                make_problem_section(c, titles[c.problem][0], problems[c.problem], gaits[c.problem])
+                for c in comparisons
+            ),
             make_folded_section("Convergence", comparisons, list_convergence),
             make_folded_section("Cost to targets", comparisons, list_costs),
             make_folded_section("Significance", comparisons, list_tests, TESTS),
@@ -94,11 +101,28 @@ def make_study_document(
                 "Optimum: active constraints, prices, gaits",
                 comparisons,
                 lambda c: list_optimum(c, gaits[c.problem]),
-                HOW,
             ),
             make_settings_section(comparisons, manifest.sessions),
         ),
     )
+
+
+def _write_title(titles: Sequence[tuple[str, str]]) -> str:
+    """Return the task and the objective, or what several problems have in common."""
+    goals = dict.fromkeys(goal for _, goal in titles)
+    if len(titles) == 1:
+        return ": ".join(titles[0])
+    goal = "".join(goals) if len(goals) == 1 else f"{len(titles)} problems"
+    return f"{goal[:1].upper()}{goal[1:]}"
+
+
+def _describe_latest(sessions: Sequence[Session]) -> tuple[Prose, ...]:
+    """Return date, version and command of the latest session."""
+    if not sessions:
+        return ()
+    session = sessions[-1]
+    version = escape_markdown(f"{session.started[:10]}, version {session.versions.get('nlp-gait', 'unknown')}")
+    return (Prose(f"{version}: `{session.command.replace('`', ' ')}`"),)
 
 
 def _describe_progress(manifest: Manifest, records: Sequence[RunRecord], excluded: int) -> tuple[str, ...]:

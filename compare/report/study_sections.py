@@ -6,78 +6,109 @@ from functools import partial
 
 from compare.analysis.columns import EFFORT, EVALUATIONS_TO, JUDGEMENT, MAIN, SECONDS_TO, Column, format_rows
 from compare.analysis.comparison import Comparison
-from compare.analysis.headline import describe_unknown
+from compare.analysis.headline import describe_unknown, write_headline
 from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers, rank_over_problems
 from compare.analysis.record_statistics import list_weights
-from compare.analysis.units import BY_UNIT
-from compare.drawing.charts import Chart, draw_charts, encode_charts
-from compare.drawing.comparison_figures import (
-    make_convergence_charts,
-    make_critical_difference_charts,
-    make_ecdf_charts,
-    make_final_gap_charts,
-)
+from compare.analysis.units import BY_UNIT, name_in_words, name_solver, with_unit
+from compare.drawing.charts import Chart, draw_chart
+from compare.drawing.comparison_figures import make_convergence_charts, make_ecdf_charts, make_final_gap_charts
 from compare.drawing.gait_figure import GaitCurves, draw_gaits, make_gait_charts, prepare_gait
 from compare.report.document import Figure, Part, Prose, Section, Table, make_table_section, make_text_table
 from compare.report.interactive import describe_gaits
 from compare.report.provenance import TERMS, format_settings, make_solver_table
-from compare.report.writing import make_citation_section, make_session_section
-from compare.study.record import RunRecord, find_best, load_gait
+from compare.report.writing import escape_markdown, make_anchor, make_citation_section, make_session_section
+from compare.study.record import RunRecord, find_best, load_gait, load_problem
 from compare.study.settings import Session
 from nlp_gait.errors import GaitError
 from nlp_gait.files import make_file_name
+from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import ActiveConstraint
 
 SHOWN_CONSTRAINTS = 15
-HOW = Prose("`nlp-gait simulate RECORD.json` simulates a run's gait in MuJoCo (extra `sim`).")
+SHOWN_VARIABLES = 12  # of the best design
+HOW_PROVEN = "How it is proven"
+SCALES = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "rad": (180.0 / math.pi, "deg"), "rad/s": (180.0 / math.pi, "deg/s")}
 # Figures of a problem by name: the function from its comparison to charts, and the caption.
 FIGURES = {
-    "final": (make_final_gap_charts, "Bar: median; dotted: tolerance."),
+    "final": (make_final_gap_charts, ""),
     "convergence": (
         make_convergence_charts,
         "Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end. Gaps below 1e-6 % "
         "are drawn at that value.",
     ),
     "runtime": (
-        make_ecdf_charts,
+        lambda comparison: make_ecdf_charts([comparison]),
         "Share of pairs of run and target solved within a cost; 31 targets, 100 % to 1e-4 % above the best known.",
     ),
 }
 
 
-def make_problem_section(comparison: Comparison, gaits: Mapping[str, GaitCurves] | str) -> Section:
+def load_problem_or_none(comparison: Comparison) -> GaitProblem | None:
+    """Return the problem of a comparison; None if it cannot be loaded, as user code that the command does not name."""
+    try:
+        return load_problem(comparison.records[0])
+    except GaitError:
+        return None
+
+
+def split_title(comparison: Comparison, problem: GaitProblem | None) -> tuple[str, str]:
+    """Return the task and the objective in words: ``NAO on one leg`` and ``mean motor power``."""
+    name, objective = comparison.problem, comparison.objective.name
+    if problem is None or problem.name != name:
+        return name, objective
+    task, _, goal = problem.title.partition(": ")
+    return task, goal or objective
+
+
+def make_problem_section(
+    comparison: Comparison, title: str, problem: GaitProblem | None, gaits: Mapping[str, GaitCurves] | str
+) -> Section:
     """Return what is seen first; ``gaits`` are those of ``load_gaits``."""
-    parts: list[Part] = [make_figure(comparison, "final")]
+    sentence = escape_markdown(write_headline(comparison))
+    link = sentence.replace("proven", f"[proven](#{make_anchor(HOW_PROVEN)})", 1)
+    parts: list[Part] = [Prose(link), make_figure(comparison, "final")]
     if isinstance(gaits, str):
         parts.append(gaits)
     elif any(gait.skeleton is not None for gait in gaits.values()):
         parts.append(
             Figure(
                 name=f"{make_file_name(comparison.problem)}-gaits",
-                caption="Best gait.",
+                caption="",
                 drawing=partial(draw_gaits, gaits, curves=False),
-                data=describe_gaits(gaits, curves=False),
+                gaits=describe_gaits(gaits),
             )
         )
-    return Section(title=comparison.problem, parts=(*parts, make_statistics_table(comparison, MAIN)))
+    parts += [*list_design(comparison, problem), make_statistics_table(comparison, MAIN)]
+    return Section(title=title, parts=parts, half=True)
+
+
+def list_design(comparison: Comparison, problem: GaitProblem | None) -> tuple[Part, ...]:
+    """Return the objective and the variables of the best point with their units."""
+    best = comparison.best
+    if best is None:
+        return ()
+    units = {} if problem is None else {variable.name: variable.unit for variable in problem.variables}
+    objective = comparison.objective
+    rows = [(objective.name.replace("_", " "), with_unit(best.verdict.objective, objective.unit))]
+    for name, value in list(best.x.items())[:SHOWN_VARIABLES]:
+        unit = units.get(name, "1")
+        scale, shown = SCALES.get(unit, (1.0, unit))
+        rows.append((name_in_words(name, unit), with_unit(scale * value, shown, ".4g")))
+    more = len(best.x) - SHOWN_VARIABLES
+    if more > 0:
+        rows.append((f"and {more:,} more", "report --csv"))
+    return (make_text_table(("best design", name_solver(best.solver)), rows),)
 
 
 def make_figure(comparison: Comparison, name: str) -> Figure:
     """Return one of ``FIGURES``."""
     compute, caption = FIGURES[name]
-    charts = compute(comparison)
-    stem = f"{make_file_name(comparison.problem)}-{name}"
-    return make_chart_figure(stem, caption, charts)
+    return make_chart_figure(f"{make_file_name(comparison.problem)}-{name}", caption, compute(comparison))
 
 
-def make_chart_figure(name: str, caption: str, charts: Sequence[Chart], columns: int = 2) -> Figure:
-    """Return the figure of charts, which the page draws itself."""
-    return Figure(
-        name=name,
-        caption=caption,
-        drawing=partial(draw_charts, charts, columns),
-        data=encode_charts(charts),
-    )
+def make_chart_figure(name: str, caption: str, charts: Sequence[Chart]) -> Figure:
+    """Return the figure of charts."""
+    return Figure(name=name, caption=caption, drawing=[draw_chart(chart) for chart in charts])
 
 
 def make_statistics_table(comparison: Comparison, columns: tuple[Column, ...], caption: str = "") -> Table:
@@ -92,14 +123,17 @@ def load_gaits(comparison: Comparison) -> dict[str, GaitCurves] | str:
         key=lambda solver: (solver.best is not comparison.best, not solver.is_user_defined),
     )
     try:
-        results = {solver.name: load_gait(solver.best) for solver in solvers if solver.best is not None}
+        results = {solver.title: load_gait(solver.best) for solver in solvers if solver.best is not None}
         return {name: prepare_gait(gait) for name, gait in results.items() if gait.problem.display.motion is not None}
     except GaitError as error:
         return f"The gaits are not drawn: {error}."
 
 
 def make_folded_section(
-    title: str, comparisons: Sequence[Comparison], make_parts: Callable[[Comparison], Iterable[Part]], *ending: Part
+    title: str,
+    comparisons: Sequence[Comparison],
+    make_parts: Callable[[Comparison], Iterable[Part]],
+    *ending: Part,
 ) -> Section:
     """Return a section that opens on demand, with a section for each of several problems."""
     if len(comparisons) == 1:
@@ -114,14 +148,15 @@ def list_convergence(comparison: Comparison) -> tuple[Part, ...]:
 
 
 def list_costs(comparison: Comparison) -> tuple[Part, ...]:
-    """Return costs to targets, the effort, and the failed runs."""
+    """Return the expected running times to targets, the effort, and the failed runs."""
     return (
         make_figure(comparison, "runtime"),
         *describe_unknown(comparison),
         make_statistics_table(
             comparison,
             (*EVALUATIONS_TO, *SECONDS_TO),
-            "Expected running time: cost of all runs until the target, divided by the number that reached it",
+            "Expected running time: cost of all runs until the target, divided by the number that reached it. It is a mean: one "
+            "long run raises it",
         ),
         make_statistics_table(
             comparison, EFFORT, "Medians of a run; build and compile are the longest, once for each process"
@@ -132,7 +167,7 @@ def list_costs(comparison: Comparison) -> tuple[Part, ...]:
 
 def _list_failures(comparison: Comparison) -> tuple[Section, ...]:
     rows = [
-        (r.solver, str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-")
+        (name_solver(r.solver), str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-")
         for r in comparison.records
         if not r.verdict.feasible
     ]
@@ -142,7 +177,8 @@ def _list_failures(comparison: Comparison) -> tuple[Section, ...]:
 
 def list_tests(comparison: Comparison) -> tuple[Part, ...]:
     """Return the tests of all pairs of solvers, and whether they can show anything."""
-    rows = [(f"{p.first} < {p.second}", _format_p(p.rank_sum), f"{p.a12:.3f}") for p in comparison.pairs]
+    pairs = [(f"{name_solver(p.first)} < {name_solver(p.second)}", p) for p in comparison.pairs]
+    rows = [(words, _format_p(p.rank_sum), f"{p.a12:.3f}") for words, p in pairs]
     power = (f"{comparison.power[:1].upper()}{comparison.power[1:]}.",) if comparison.power else ()
     return (*power, make_text_table(("better median < other", "rank-sum p", "A12"), rows)) if rows else ()
 
@@ -161,13 +197,17 @@ def list_optimum(comparison: Comparison, gaits: Mapping[str, GaitCurves] | str) 
     """Return active constraints with prices, the gaits over time, and limits between the samples."""
     charts = [] if isinstance(gaits, str) or not gaits else make_gait_charts(gaits)
     caption = (
-        "Best gait of each solver. The deviation is the largest distance of a joint from its place in the best gait "
-        "after the same share of the time. Mechanical power is the sum of |torque x rate| over the joints. The balance margin "
-        "is the distance of the zero-moment point from the nearest edge of the support polygon, negative outside of it."
+        "Best gait of each solver. Mechanical power is the sum of |torque x rate| over the joints. The balance margin is the "
+        "distance of the zero-moment point from the nearest edge of the support polygon, negative outside of it."
     )
+    how = "`nlp-gait simulate RECORD.json` simulates a run's gait in MuJoCo (extra `sim`)."
     return (
         *_list_active(comparison),
-        *((make_chart_figure(f"{make_file_name(comparison.problem)}-curves", caption, charts, 3),) if charts else ()),
+        *(
+            (make_chart_figure(f"{make_file_name(comparison.problem)}-curves", caption, charts), Prose(how))
+            if charts
+            else ()
+        ),
         *_list_violated_between(comparison),
     )
 
@@ -192,7 +232,7 @@ def _list_active(comparison: Comparison) -> tuple[Section, ...]:
         "Active constraints",
         ("constraint", "side", "at", "price", "for a step"),
         rows,
-        f"At the best optimum of {record.solver} (run {record.run}). The price is the change of the optimal "
+        f"At the best optimum of {name_solver(record.solver)} (run {record.run}). The price is the change of the optimal "
         f"{comparison.objective.name} per unit by which the bound is raised, highest first.{note}",
     )
 
@@ -207,7 +247,7 @@ def _describe_step(active: ActiveConstraint, unit: str) -> str:
 
 def _list_violated_between(comparison: Comparison) -> tuple[Section, ...]:
     rows = [
-        (r.solver, str(r.run), "; ".join(r.verdict.violated[:3]) or "-", _describe_proof(r))
+        (name_solver(r.solver), str(r.run), "; ".join(r.verdict.violated[:3]) or "-", _describe_proof(r))
         for r in comparison.records
         if r.verdict.feasible and (r.verdict.dense_feasible is False or _describe_proof(r) != "-")
     ]
@@ -222,7 +262,7 @@ def _describe_proof(record: RunRecord) -> str:
 
 
 def make_settings_section(comparisons: Sequence[Comparison], sessions: Sequence[Session]) -> Section:
-    """Return what the solvers claim, how costs are counted, all settings, sessions, citations and terms."""
+    """Return what the solvers report, how costs are counted, all settings, sessions, citations and terms."""
     sizes = [max((len(r.x) for r in c.records), default=0) for c in comparisons]
     weights = [
         (c.problem, *map("{:g}".format, list_weights(n).values())) for c, n in zip(comparisons, sizes, strict=True)
@@ -235,8 +275,9 @@ def make_settings_section(comparisons: Sequence[Comparison], sessions: Sequence[
     return make_folded_section(
         "Settings and provenance",
         comparisons,
-        lambda c: (make_statistics_table(c, JUDGEMENT, f"Claims and judgement; best known value: {c.known.source}"),),
-        "Claimed is what the solvers report. Everything else is what the judge finds with the exact functions at the reported "
+        lambda c: (make_statistics_table(c, JUDGEMENT, "Reported by the solvers, and found by the judge"),),
+        Section(title=HOW_PROVEN, parts=[f"{c.problem}: {c.known.source}." for c in comparisons]),
+        "Reported is what the solvers say. Everything else is what the judge finds with the exact functions at the reported "
         "point. Searches with equal seeds start from the same points; run k has the study's seed plus k. Defaults are those of "
         "the sources; none was tuned on these problems.",
         make_solver_table(record for comparison in comparisons for record in comparison.records),
@@ -264,14 +305,6 @@ def make_overview(comparisons: Sequence[Comparison]) -> Section:
         _make_matrix(comparisons, ranking),
         *(make_wins_table(comparisons, solver) for solver in list_user_solvers(comparisons)),
     ]
-    if ranking.critical_difference is not None:
-        parts.append(
-            make_chart_figure(
-                "critical-difference",
-                f"Mean ranks of the medians; solvers whose points lie on one line do not differ. {describe_tests(ranking)}",
-                make_critical_difference_charts(ranking),
-            )
-        )
     return Section(title="All problems", parts=parts)
 
 
@@ -283,7 +316,8 @@ def _make_matrix(comparisons: Sequence[Comparison], ranking: Ranking) -> Table:
         medians = {solver.name: solver.median_cost for solver in comparison.solvers}
         rows.append((comparison.problem, *(_format_cell(comparison, name, medians) for name in names)))
     rows.append(("mean rank", *(f"{ranks[name]:.2f}" if name in ranks else "-" for name in names)))
-    return make_text_table(("problem", *names), rows, "Median gap of each solver on each problem")
+    caption = "Median gap of each solver on each problem"
+    return make_text_table(("problem", *map(name_solver, names)), rows, caption)
 
 
 def _format_cell(comparison: Comparison, name: str, medians: Mapping[str, float]) -> str:
@@ -296,9 +330,9 @@ def _format_cell(comparison: Comparison, name: str, medians: Mapping[str, float]
 
 def make_wins_table(comparisons: Sequence[Comparison], solver: str) -> Table:
     """Return on how many problems a solver is better or worse than each other one."""
-    rows = [(r.other, str(r.wins), str(r.ties), str(r.losses)) for r in count_wins(comparisons, solver)]
+    rows = [(name_solver(r.other), str(r.wins), str(r.ties), str(r.losses)) for r in count_wins(comparisons, solver)]
     caption = (
-        f"Problems on which {solver} is significantly better, not different, or worse (rank-sum test of the final objectives at "
-        "5 %, Holm-corrected over all pairs on the problem)"
+        f"Problems on which {name_solver(solver)} is significantly better, not different, or worse (rank-sum test of the final "
+        "objectives at 5 %, Holm-corrected over all pairs on the problem)"
     )
     return make_text_table(("against", "wins", "ties", "losses"), rows, caption)

@@ -11,8 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
-from compare.drawing.figures import inline_svg, render_svg
-from compare.drawing.shapes import Drawing
+from compare.drawing.figures import inline_svg
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, iterate_leaves, make_text_table
 from compare.report.provenance import explain
 from compare.study.citations import cite_problems
@@ -25,12 +24,9 @@ MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]#|~])")
 
 def write_document(folder: Path, document: Document, page: str = "report") -> list[Path]:
     """Write ``<page>.html``, ``<page>.md`` and what ``write_parts`` writes; return the paths. Raises OutputError."""
-    files = write_parts(folder, document.parts)
-    drawings = [path.read_text(encoding="utf-8") for path in files if path.suffix == ".svg"]
-    pages = [folder / f"{page}.html", folder / f"{page}.md"]
-    write_text(pages[0], render_page(document, drawings))
-    write_text(pages[1], render_markdown(document))
-    return [*pages, *files]
+    pages = {"html": render_page(document), "md": render_markdown(document)}
+    written = [write_text(folder / f"{page}.{suffix}", text) for suffix, text in pages.items()]
+    return [*written, *write_parts(folder, document.parts)]
 
 
 def write_parts(folder: Path, parts: Sequence[Part]) -> list[Path]:
@@ -38,20 +34,18 @@ def write_parts(folder: Path, parts: Sequence[Part]) -> list[Path]:
     files: list[Path] = []
     for part in iterate_leaves(parts):
         if isinstance(part, Figure):
-            drawing = part.draw()
-            svg = drawing.to_svg() if isinstance(drawing, Drawing) else render_svg(drawing)
-            files.append(write_text(folder / f"{part.name}.svg", svg))
+            files.append(write_text(folder / f"{part.name}.svg", part.render()))
         elif isinstance(part, Table) and part.name:
             files.append(write_text(folder / f"{part.name}.csv", format_csv(part.csv_rows)))
     return files
 
 
-def render_page(document: Document, drawings: Sequence[str]) -> str:
-    """Return one page without any other file, with the figures' drawings as SVG in their order; all text in it is escaped."""
+def render_page(document: Document) -> str:
+    """Return one page without any other file, with the figures as SVG; all text in it is escaped."""
     figures = [part for part in iterate_leaves(document.parts) if isinstance(part, Figure)]
     svg = {
-        figure.name: Markup(inline_svg(drawing, f"f{i}", f"figure {i}"))
-        for i, (figure, drawing) in enumerate(zip(figures, drawings, strict=True), start=1)
+        figure.name: [Markup(inline_svg(panel, f"f{i}-{k}", f"figure {i}")) for k, panel in enumerate(figure.panels)]
+        for i, figure in enumerate(figures, start=1)
     }
     return _load_templates(page=True).get_template("report.html.j2").render(document=document, svg=svg)
 
@@ -72,7 +66,7 @@ def _load_templates(*, page: bool) -> Environment:
         trim_blocks=not page,
         lstrip_blocks=not page,
     )
-    filters = {"kind": _name_kind, "html": _render_html, "anchor": _make_anchor, "md": _escape_markdown}
+    filters = {"kind": _name_kind, "html": _render_html, "anchor": make_anchor, "md": escape_markdown}
     environment.filters |= filters | {"explain": explain}
     return environment
 
@@ -81,7 +75,7 @@ def _name_kind(part: Part) -> str:
     return type(part).__name__
 
 
-def _make_anchor(title: str) -> str:
+def make_anchor(title: str) -> str:
     """Id of a section within the page, unlike the ids within figures."""
     return "section-" + re.sub(r"\W+", "-", title).strip("-").lower()
 
@@ -91,7 +85,7 @@ def _render_html(markdown: str) -> Markup:
     return Markup(MARKDOWN.render(markdown))
 
 
-def _escape_markdown(text: str) -> str:
+def escape_markdown(text: str) -> str:
     """Text as Markdown shows it literally, on one line."""
     escaped = MARKDOWN_SPECIAL.sub(r"\\\1", " ".join(text.split()))
     return escaped.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

@@ -84,10 +84,15 @@ async function openPlayground() {
   figure.interactive = element("div", { class: "interactive" });
   figure.querySelector("figcaption").before(figure.interactive);
   const gaits = [model.gait(x, "yours", YOURS), model.gait(model.optimum.x, "proven optimum", OPTIMUM), model.gait(x, "leader of the race", LEADER)];
-  const view = new GaitView(figure, { gaits });
+  const view = new GaitView(figure, { gaits, over: true, speed: 0.25 });
+  const curves = element("div", { class: "curves" }, figure.interactive);
+  const charts = [["power", "mechanical power [W]"], ["margin", "balance margin [mm]"]].map(([key, y]) => [key, new Chart(curves, { label: y, x: "time [s]", y, height: 200 })]);
   const put = (i, point) => {
     view.gaits[i] = model.gait(point, gaits[i].name, gaits[i].colour);
     view.select();
+    for (const [key, chart] of charts)
+      chart.show(view.gaits.slice(0, 2).map((gait) => ({ name: gait.name, colour: gait.colour, line: "-", shape: "line",
+        points: gait.t.map((t, k) => [t / 1000, gait[key][k], `${gait.name}: ${formatNumber(gait[key][k])} at ${formatNumber(t / 1000)} s`]) })));
   };
   const move = (point) => {
     x = [...point];

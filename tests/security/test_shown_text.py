@@ -12,7 +12,6 @@ from compare.analysis.comparison import compare_problems
 from compare.cli import printing
 from compare.cli.printing import PlainConsole, escape_controls
 from compare.drawing.figures import inline_svg, make_figure, render_svg, use_style
-from compare.report.document import Figure, iterate_leaves
 from compare.report.study_report import make_study_document
 from compare.report.writing import render_markdown, render_page
 from compare.study.settings import Manifest, Session, SolverSpec, StudySettings
@@ -67,11 +66,7 @@ def hostile_report() -> tuple[Page, str]:
     settings = StudySettings(problems=(ProblemSpec(name="walk", label=MARKED),), solvers=(SolverSpec(name=MARKED),))
     document = make_study_document(compare_problems(records), Manifest(settings=settings, sessions=(session,)))
     page = Page()
-    page.feed(
-        render_page(
-            document, ["<svg ></svg>"] * sum(isinstance(part, Figure) for part in iterate_leaves(document.parts))
-        )
-    )
+    page.feed(render_page(document))
     return page, render_markdown(document)
 
 

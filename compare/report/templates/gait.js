@@ -1,7 +1,7 @@
 "use strict";
-// Gaits in 3-D on a canvas: play, scrub, turn; a second gait over the first one; power and balance margin in step below.
-const SIDES = { left: "#0072B2", right: "#D55E00", trunk: "#000000" };
-const SUPPORT = "#009E73", ZMP = "#CC79A7";
+// Gaits in 3-D on a canvas: play, scrub, turn; a second gait over the first one; a line in the charts over time.
+const SIDES = { left: "#7A5CC0", right: "#A07D1C", trunk: "#000000" };
+const SUPPORT = "#909090", ZMP = "#C03A3A";
 
 const mix = (a, b, share) => (Array.isArray(a) ? a.map((value, i) => mix(value, b[i], share)) : a + (b - a) * share);
 
@@ -34,12 +34,11 @@ function hull(points) {
 class GaitView {
   constructor(figure, data) {
     Object.assign(this, { gaits: data.gaits, time: 0, playing: !matchMedia("(prefers-reduced-motion: reduce)").matches,
-      yaw: data.gaits[0].planar ? 0 : -0.6, pitch: data.gaits[0].planar ? 0 : 0.25, speed: 0.25, visible: true });
+      yaw: data.gaits[0].planar ? 0 : -0.6, pitch: data.gaits[0].planar ? 0 : 0.25, speed: data.speed ?? 1, over: data.over, visible: true });
     const parent = figure.interactive;
-    this.charts = data.gaits.some((gait) => gait.power || gait.margin) && {};
-    this.addControls(element("div", { class: "controls gait" }, parent));
     this.canvas = element("canvas", { tabindex: "0", role: "img",
       "aria-label": "Gait in 3-D. Drag or use arrow keys to turn it, the space bar plays and pauses." }, parent);
+    this.addControls(element("div", { class: "controls gait" }, parent));
     this.canvas.addEventListener("pointerdown", (event) => { this.grip = [event.clientX, event.clientY, this.yaw, this.pitch]; this.canvas.setPointerCapture(event.pointerId); });
     this.canvas.addEventListener("pointermove", (event) => {
       if (!this.grip) return;
@@ -47,11 +46,11 @@ class GaitView {
     });
     for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, () => { this.grip = null; });
     this.canvas.addEventListener("keydown", (event) => this.press(event));
-    if (this.charts) {
-      const curves = element("div", { class: "curves" }, parent);
-      for (const [key, y] of [["power", "mechanical power [W]"], ["margin", "balance margin [mm]"]])
-        if (this.gaits.some((gait) => gait[key])) this.charts[key] = new Chart(curves, { label: y, x: "time [s]", y, height: 200 });
-    }
+    // A line in each chart over time, which moves with the gait.
+    this.cursors = [...figure.querySelectorAll("svg[data-time]")].map((svg) => {
+      const [start, end, from, to] = svg.dataset.time.split(" ").map(Number);
+      return { line: element("svg:line", { y1: 8, y2: svg.viewBox.baseVal.height - 40, class: "cursor" }, svg), at: (t) => start + ((t - from) / (to - from)) * (end - start) };
+    });
     new IntersectionObserver((entries) => { this.visible = entries.at(-1).isIntersecting; }).observe(this.canvas); // the last is the latest
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.select();
@@ -66,17 +65,15 @@ class GaitView {
     this.slider.addEventListener("input", () => { this.play(false); this.time = (this.slider.value / 1000) * this.duration; this.draw(); });
     this.clock = element("output", {}, bar);
     const select = (words, options, chosen, act) => {
-      const made = element("select", {}, element("label", {}, bar, `${words} `));
+      const made = element("select", { "aria-label": words }, bar);
       for (const [value, shown] of options) element("option", { value }, made, shown);
       made.value = chosen;
       made.addEventListener("change", () => act(made.value));
       return made;
     };
-    const names = this.gaits.map((gait, i) => [i, gait.name]);
-    const again = () => this.select();
-    this.first = this.charts ? select("gait", names, "0", again) : { value: "0" };
-    this.second = select("over", [["", "none"], ...names], names.length > 1 ? "1" : "", again);
-    if (this.charts) select("speed", [[1, "1"], [0.5, "1/2"], [0.25, "1/4"], [0.1, "1/10"]], "0.25", (value) => { this.speed = Number(value); });
+    const names = this.gaits.map((gait, i) => [i, `with ${gait.name}`]).slice(1);
+    this.second = names.length ? select("gait over it", [["", "alone"], ...names], this.over ? "1" : "", () => this.select()) : { value: "" };
+    select("speed", [[1, "real speed"], [0.5, "1/2"], [0.25, "1/4"], [0.1, "1/10"]], String(this.speed), (value) => { this.speed = Number(value); });
     this.play(this.playing);
   }
 
@@ -100,14 +97,10 @@ class GaitView {
   }
 
   select() {
-    this.shown = [this.gaits[this.first.value], ...(this.second.value === "" || this.second.value === this.first.value ? [] : [this.gaits[this.second.value]])];
+    this.shown = [this.gaits[0], ...(this.second.value === "" ? [] : [this.gaits[this.second.value]])];
     this.duration = Math.max(...this.shown.map((gait) => gait.t[gait.t.length - 1]));
     const all = this.shown.flatMap((gait) => [...gait.limbs, ...gait.soles].flatMap((part) => part.points.flat()));
     this.box = [0, 1, 2].map((i) => [all.reduce((m, p) => Math.min(m, p[i]), Infinity), all.reduce((m, p) => Math.max(m, p[i]), -Infinity)]);
-    for (const [key, chart] of Object.entries(this.charts || {}))
-      chart.show(this.shown.filter((gait) => gait[key]).map((gait) => ({ name: gait.name, colour: gait.colour, line: "-", shape: "line",
-        points: gait.t.map((t, i) => [t / 1000, gait[key][i], `${gait.name}: ${formatNumber(gait[key][i])} at ${formatNumber(t / 1000)} s`])
-          .filter(([, value]) => Number.isFinite(value)) })));
     this.draw();
   }
 
@@ -128,24 +121,29 @@ class GaitView {
     const time = Math.min(this.time, this.duration);
     this.slider.value = String(Math.round((1000 * time) / this.duration));
     this.clock.value = `${(time / 1000).toFixed(2)} s`;
-    for (const chart of Object.values(this.charts || {})) { chart.cursor = time / 1000; chart.mark(); }
+    for (const { line, at } of this.cursors) for (const end of ["x1", "x2"]) line.setAttribute(end, at(time / 1000));
     canvas.width = width * ratio;
     canvas.height = height * ratio;
     const pen = canvas.getContext("2d");
     pen.scale(ratio, ratio);
     this.ink = getComputedStyle(canvas).color;
-    const middle = this.box.map(([low, high]) => (low + high) / 2);
-    const reach = Math.hypot(...this.box.map(([low, high]) => high - low)) || 1;
-    const scale = Math.min(width, height) / reach;
+    const frames = this.shown.map((gait) => frameAt(gait, time));
     const [cy, sy, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
+    const middle = this.box.map(([low, high]) => (low + high) / 2), [dx, dy, dz] = this.box.map(([low, high]) => high - low);
+    const follow = dx > 2 * dz; // a long walk: the robot stays in the middle
+    if (follow) middle[0] = frames[0].limbs[0].points[0][0];
+    const long = follow ? 2 * dz : dx;
+    const across = long * Math.abs(cy) + dy * Math.abs(sy), up = dz * cp + (long * Math.abs(sy) + dy * Math.abs(cy)) * Math.abs(sp);
+    const scale = Math.min((0.95 * width) / across, (height - 50) / up);
     // Seen from the right: x to the right, z up; yaw turns about z, pitch tilts towards the viewer.
     this.project = (point) => {
       const [x, y, z] = point.map((value, i) => value - middle[i]);
       const right = x * cy - y * sy, deep = x * sy + y * cy;
-      return [width / 2 + scale * right, height / 2 - scale * (z * cp + deep * sp)];
+      return [width / 2 + scale * right, height / 2 + 12 - scale * (z * cp + deep * sp)];
     };
     this.drawGround(pen);
-    [...this.shown].reverse().forEach((gait, i, list) => this.drawGait(pen, gait, frameAt(gait, time), i === list.length - 1));
+    for (const i of this.shown.keys()) this.drawGait(pen, this.shown[i], frames[i], i === 0);
+    this.drawLegend(pen);
     canvas.dataset.time = String(Math.round(time));
   }
 
@@ -156,6 +154,23 @@ class GaitView {
     pen.strokeStyle = colour === "#000000" || colour === "#404040" ? this.ink : colour;
     pen.lineWidth = thickness;
     pen.stroke();
+  }
+
+  drawLegend(pen) {
+    const [first, second] = this.shown, point = (name) => first[name] && name;
+    const entries = [["left leg", SIDES.left], ["right leg", SIDES.right], second && [`${second.name}, dashed`, second.colour],
+      point("com") && ["centre of mass", "#000000"], point("zmp") && ["ZMP", ZMP], first.soles.length && point("zmp") && ["support", SUPPORT]];
+    let x = 8, y = 16;
+    pen.font = "12px system-ui, sans-serif";
+    for (const [words, colour] of entries.filter(Boolean)) {
+      const width = pen.measureText(words).width + 28;
+      if (x + width > this.canvas.clientWidth && x > 8) [x, y] = [8, y + 16];
+      pen.fillStyle = colour === "#000000" ? this.ink : colour;
+      pen.fillRect(x, y - 8, 10, 8);
+      pen.fillStyle = this.ink;
+      pen.fillText(words, x + 14, y);
+      x += width;
+    }
   }
 
   drawGround(pen) {
@@ -178,7 +193,11 @@ class GaitView {
       pen.fill();
     }
     pen.setLineDash(first ? [] : [5, 3]);
-    for (const sole of frame.soles) this.line(pen, sole.points, first ? SIDES[sole.side] : gait.colour, 1.5, true);
+    for (const sole of frame.soles) {
+      const colour = first ? SIDES[sole.side] : gait.colour, leg = frame.limbs.find((limb) => limb.side === sole.side);
+      this.line(pen, sole.points, colour, 1.5, true);
+      if (leg) for (const corner of sole.points) this.line(pen, [leg.points.at(-1), corner], colour, 1);
+    }
     for (const limb of frame.limbs) this.line(pen, limb.points, first ? SIDES[limb.side] : gait.colour, first ? 3 : 2);
     pen.setLineDash([]);
     for (const [point, colour, size] of [[frame.com, this.ink, 4], [frame.zmp, ZMP, 5]]) {

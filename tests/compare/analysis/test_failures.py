@@ -48,12 +48,12 @@ def test_a_solver_without_any_run_ends_a_comparison_with_status_1(
 ) -> None:
     failing(monkeypatch, 1)
     with_a_run_left = nlp_gait(*STUDY, "--out", tmp_path / "left")
-    assert with_a_run_left.stderr.startswith("nlp-gait: walk12, pso: 1 of 2 runs have no result; ")
+    assert with_a_run_left.stderr.startswith("nlp-gait: walk12, PSO: 1 of 2 runs have no result (run 0 failed: ")
     assert with_a_run_left.stderr.count("\n") == 1
     monkeypatch.undo()
     failing(monkeypatch, 2)
     first, last = nlp_gait(*STUDY, "--out", tmp_path, status=1).stderr.splitlines()
-    assert first == "nlp-gait: walk12, pso: 2 of 2 runs have no result; the first failed: RuntimeError: no home"
+    assert first == "nlp-gait: walk12, PSO: 2 of 2 runs have no result (run 0 failed: RuntimeError: no home)"
     assert last.startswith("nlp-gait: without any result: pso; fix the cause")
     assert "RuntimeError: no home" in (tmp_path / "report.md").read_text()
     again = nlp_gait("compare", "--resume", "--out", tmp_path, "--json", status=1)

@@ -1,6 +1,8 @@
 """The answer of a study: gaps from the shipped best known value of exactly this problem, what is proven, what chance may be."""
 
 import json
+import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,14 +14,14 @@ from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import write_headline, write_headlines
 from compare.analysis.record_statistics import find_best_known
 from compare.report.study_report import write_better_points
-from compare.study.record import RunRecord
+from compare.study.record import RunRecord, Times
 from compare.study.references import Reference, find_reference
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.formulation.result import load_result
 from nlp_gait.proofs.certificate import load_certificates
-from tests.compare.records import record, study
+from tests.compare.records import POWER, record, study
 
 CERTIFIED = load_certificates()["walk12-lambda-0.4"].problem
 
@@ -43,12 +45,16 @@ def test_a_study_without_ipopt_is_measured_from_the_shipped_value(runs: list[Run
     assert comparison.best is not None
     value = comparison.best.verdict.objective
     assert comparison.gap(-value) == pytest.approx((comparison.reference - value) / comparison.reference)
-    assert "proven optimal to six digits. Median runs end below it by pso" in write_headline(comparison)
+    known = f"the proven optimum of {comparison.reference:.6f}"
+    assert re.fullmatch(rf"The median PSO run ends [0-9.]+ % below {known}\..*", write_headline(comparison))
 
 
 def test_a_better_run_is_announced_and_offered(runs: list[RunRecord], tmp_path: Path) -> None:
     comparison = compare_with(Reference(objective=0.5, source="shipped, best of 2 starts"), runs)
-    assert "This is a new best known value: " in write_headline(comparison)
+    shown = comparison.format_gap(-comparison.gap(comparison.solvers[0].costs[0]))
+    assert f"found a new best value, {max(r.verdict.objective for r in runs):.6f}: {shown} better." in write_headline(
+        comparison
+    )
     assert comparison.gap(comparison.solvers[0].costs[0]) < 0.0
     (path,) = write_better_points(tmp_path, [comparison])
     written = load_result(path)
@@ -71,7 +77,7 @@ def test_less_than_the_tolerance_is_no_gain(runs: list[RunRecord]) -> None:
 def test_a_single_value_is_compared_with_the_shipped_one() -> None:
     phase = nlp_gait.load("nao-ssp")
     known, objective = find_reference(identify_problem(phase)), phase.objective
-    assert describe_value(known, 0.8543274, objective).endswith("this point is 1.0000 % from it")
+    assert describe_value(known, 0.8543274, objective).endswith("this point is 1.0 % from it")
     assert "contribute" in describe_value(known, 0.84, objective)
     other = find_reference(identify_problem(phase.with_values(reach_margin=0.02)))
     assert describe_value(other, 0.84, objective) == "Best known value: none is shipped for these settings"
@@ -80,13 +86,113 @@ def test_a_single_value_is_compared_with_the_shipped_one() -> None:
 def test_the_headline_of_a_study_by_hand() -> None:
     """Medians over all runs: newton 10, swarm 10.55, colony 11.75 W; no pair differs significantly."""
     assert write_headline(compare_problems(study())[0]) == (
-        "On walk the best power is 10.000000 W, the best of this study; none is shipped for this problem. Median runs end above "
-        "it by swarm 5.5 %, colony 18 % (too few runs for a test); newton "
-        "reaches it in 2 of 3 runs (0.5 s)."
+        "The median swarm run ends 5.5 % above the best value found (10.000000 W), colony 18 %; newton reaches it in 2 of 3 "
+        "runs. There are too few runs for tests of the order."
     )
 
 
-def test_the_users_solver_is_the_subject_with_those_that_it_differs_from() -> None:
+def make_runs(**values: Sequence[float | None]) -> list[RunRecord]:
+    """Return runs that end at values; None for an infeasible one. IPOPT has no history."""
+    return [
+        record(solver, run, [(10, value)], feasible=value is not None)
+        for solver, ends in values.items()
+        for run, value in enumerate(ends)
+    ]
+
+
+def describe(runs: Sequence[RunRecord], known: Reference | None = None, sense: str = "minimise") -> str:
+    """Return the headline of runs on one problem with a shipped value."""
+    objective = replace(POWER, sense=sense)
+    runs = [replace(r, inputs=replace(r.inputs, objective=objective)) for r in runs]
+    reference = {} if known is None or known.objective is None else {"walk": known.objective}
+    comparison = compare_problems(runs, references=reference)[0]
+    return write_headline(comparison if known is None else replace(comparison, known=known))
+
+
+PROVEN = Reference(objective=10.0, bound=10.0, source="shipped, proven to six digits")
+WITHIN = Reference(objective=10.0, bound=9.9, source="shipped, proven to 1 %")
+ZERO = Reference(objective=0.0, bound=0.0, source="shipped, proven to six digits")
+MANY_RUNS = {"pso": [10.1] * 9, "ga": [10.3] * 9, "aco": [10.0] * 9, "ipopt": [10.0] * 9}
+
+
+@pytest.mark.parametrize(
+    ("runs", "known", "sentence"),
+    [
+        (
+            make_runs(**MANY_RUNS),
+            PROVEN,
+            "The median PSO run ends 1.0 % above the proven optimum of 10.000000 W, GA 3.0 %; ACO reaches it in all 9 runs, "
+            "IPOPT from all 9 starts.",
+        ),
+        (
+            make_runs(pso=[10.1, 10.2, 10.3, 10.4] * 3, ga=[10.1, 10.2, 10.4, 10.6] * 3),
+            WITHIN,
+            "The median PSO run ends 2.5 % above the best known value of 10.000000 W (proven within 1 %), GA 3.0 % (order "
+            "uncertain).",
+        ),
+        (
+            make_runs(ipopt=[10.0] * 2),
+            PROVEN,
+            "IPOPT reaches the proven optimum of 10.000000 W from both starts (median 0.1 s).",
+        ),
+        (make_runs(pso=[10.5]), PROVEN, "The only PSO run ends 5.0 % above the proven optimum of 10.000000 W."),
+        (
+            make_runs(pso=[10.5]),
+            None,
+            "The only PSO run ends at 10.500000 W; no best known value is shipped to compare it with.",
+        ),
+        (
+            make_runs(pso=[9.0, 10.0]),
+            WITHIN,
+            "The median PSO run ends 5.0 % below the best known value of 10.000000 W (proven within 1 %). PSO, run 0, found a "
+            "new best value, 9.000000 W: 10 % better.",
+        ),
+        (
+            make_runs(pso=[0.5, 0.5], ga=[0.0, 0.0]),
+            ZERO,
+            "The median PSO run ends 0.5 W above the proven optimum of 0.000000 W; GA reaches it in both runs. There are too few "
+            "runs for tests of the order.",
+        ),
+        (make_runs(pso=[None]), PROVEN, "The only run of PSO is not feasible. The proven optimum is 10.000000 W."),
+        (make_runs(pso=[None] * 2, ga=[None] * 2), None, "None of the 4 runs of GA and PSO is feasible."),
+        (
+            [replace(r, x={}) for r in make_runs(pso=[None] * 2)],
+            None,
+            "None of the 2 runs of PSO is feasible: each failed.",
+        ),
+        (
+            make_runs(pso=[10.1, None, None], ga=[None] * 3, aco=[10.1] * 3),
+            PROVEN,
+            "The median ACO run ends 1.0 % above the proven optimum of 10.000000 W; PSO is infeasible in 2 of 3 runs; GA finds "
+            "no feasible point in 3 runs. There are too few runs for tests of the order.",
+        ),
+        (
+            make_runs(
+                **{name: [10.0 + k] * 9 for k, name in enumerate(("ipopt", "pso", "ga", "aco", "de", "cma", "slsqp"))}
+            ),
+            PROVEN,
+            "The median PSO run ends 10 % above the proven optimum of 10.000000 W, GA 20 %, ACO 30 %; IPOPT reaches it from all "
+            "9 starts, and 3 more: see the table.",
+        ),
+    ],
+)
+def test_a_sentence_is_written_for_its_case(runs: list[RunRecord], known: Reference | None, sentence: str) -> None:
+    assert describe(runs, known).replace(" (median 0.1 s)", "") == sentence.replace(" (median 0.1 s)", "")
+    assert len(re.findall(r"\.(?: |$)", sentence)) <= 2
+
+
+def test_what_is_maximised_ends_below_the_optimum() -> None:
+    assert describe(make_runs(pso=[9.0] * 3), PROVEN, "maximise").startswith(
+        "The median PSO run ends 10 % below the proven"
+    )
+
+
+def test_two_solvers_without_evaluations_or_times_are_compared() -> None:
+    runs = [replace(r, evaluations={}, time_s=Times()) for r in make_runs(ipopt=[10.0] * 3)]
+    assert describe(runs, PROVEN) == "IPOPT reaches the proven optimum of 10.000000 W from all 3 starts."
+
+
+def test_the_users_solver_is_named_with_those_from_which_it_differs() -> None:
     values = {"mine": 10.02, "pso": 10.5, "ipopt": 10.0, "near": 10.021}
     records = []
     for solver, value in values.items():
@@ -95,18 +201,16 @@ def test_the_users_solver_is_the_subject_with_those_that_it_differs_from() -> No
             code = {"solver": {"name": "my.py:mine", "source_sha256": "0" * 64}} if solver == "mine" else {}
             records.append(replace(made, inputs=replace(made.inputs, **code)))
     assert write_headline(compare_problems(records)[0]) == (
-        "On walk mine ends 0.31 % above the best power (median of 12 runs, behind ipopt, before pso), which is 10.000000 W, the "
-        "best of this study; none is shipped for this problem. Median runs end above it by near 0.32 %, pso 5.1 % (mine before "
-        "near: p = 0.75); ipopt reaches it in 12 of 12 starts (0.1 s)."
+        "The median mine run ends 0.31 % above the best value found (10.000000 W), near 0.32 % (order uncertain), PSO 5.1 %; "
+        "IPOPT reaches it from all 12 starts (median 0.1 s). By rank-sum tests mine is better than PSO, worse than IPOPT and not "
+        "distinguishable from near."
     )
 
 
-def test_many_problems_have_one_headline_and_infeasible_ones_a_plain_one() -> None:
-    failed = [record("pso", run, [(10, None)], feasible=False) for run in range(2)]
-    assert write_headlines(compare_problems(failed)) == ("On walk no run is feasible: pso.",)
+def test_many_problems_have_one_headline() -> None:
     many = [replace(r, problem=f"walk-{k}") for k in range(5) for r in study()]
     (headline,) = write_headlines(compare_problems(many))
     assert headline == (
-        "The median over 5 problems of the median gap is: newton 0.0000 %, swarm 5.5000 % and colony 17.5000 %. Best known "
-        "values reached, of 5: newton on 5."
+        "Over 5 problems, the median of the median gaps is newton 0 %, swarm 5.5 % and colony 18 %. Best known values are "
+        "reached by newton on 5."
     )

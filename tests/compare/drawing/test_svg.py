@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from compare.drawing.charts import Chart, Series, draw_charts
+from compare.drawing.charts import Chart, Series, draw_chart
 from compare.drawing.figures import assign_looks, share_looks
 
 NS = "{http://www.w3.org/2000/svg}"
@@ -18,13 +18,14 @@ X = np.array([1.0, 10.0, 1000.0, np.inf])
 @pytest.mark.parametrize("log", [(True, True), (True, False), (False, False)])
 def test_every_known_point_is_drawn_inside_the_picture(shape: str, log: tuple[bool, bool]) -> None:
     series = [Series(name=name, x=X, y=np.array([1e-4, 0.1, 2.0, 3.0]), shape=shape) for name in ("a <b>", "c")]  # type: ignore[arg-type]
-    root = ElementTree.fromstring(draw_charts([Chart(x="cost", y="gap & more", series=series, log=log)]).to_svg())
+    root = ElementTree.fromstring(draw_chart(Chart(x="cost", y="gap & more", series=series, log=log)).to_svg())
     _, _, width, height = map(float, root.attrib["viewBox"].split())
     texts = [text.text for text in root.iter(f"{NS}text")]
     assert {"a <b>", "c", "cost", "gap & more"} <= set(texts)  # escaped, with a legend
     _, *drawn, _, _ = [path.attrib["d"] for path in root.iter(f"{NS}path")]  # after the grid, before the legend
-    assert len(drawn) == 2
-    for path in drawn:
+    paths = ["".join(drawn[:3]), "".join(drawn[3:])] if shape == "points" else drawn  # a marker has its own note
+    assert len(paths) == 2
+    for path in paths:
         points = [(float(a), float(b)) for a, b in re.findall(PLACES[shape], path)]
         assert len(points) == (5 if shape == "step" else 3)
         assert all(0.0 < x <= width and 0.0 <= y < height for x, y in points)
@@ -34,8 +35,26 @@ def test_every_known_point_is_drawn_inside_the_picture(shape: str, log: tuple[bo
 def test_a_chart_without_any_point_has_axes_alone() -> None:
     empty = np.array([])
     ElementTree.fromstring(
-        draw_charts([Chart(x="x", y="y", series=[Series(name="a", x=empty, y=empty)], log=(True, True))]).to_svg()
+        draw_chart(Chart(x="x", y="y", series=[Series(name="a", x=empty, y=empty)], log=(True, True))).to_svg()
     )
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [(3e-5, 20.0, "10⁻⁴ 10⁻² 1"), (0.02, 300.0, "10⁻¹ 10"), (1.1, 6.0, "2 5"), (0.5, 0.6, "0.5 0.55 0.6")],
+)
+def test_ticks_of_an_axis_are_of_one_kind(low: float, high: float, words: str) -> None:
+    series = [Series(name="a", x=np.array([low, high]), y=np.array([0.0, 1.0]))]
+    root = ElementTree.fromstring(draw_chart(Chart(x="x", y="", series=series, log=(True, False)), 300.0).to_svg())
+    texts = [text.text for text in root.iter(f"{NS}text")]
+    assert " ".join(texts[: len(words.split())]) == words
+
+
+def test_a_named_row_has_its_note_and_a_point_its_own() -> None:
+    series = [Series(name="PSO", x=np.array([1.0]), y=np.array([1.0]), shape="points", notes=["run 0: 1 %"])]
+    root = ElementTree.fromstring(draw_chart(Chart(x="gap", y="", series=series, rows=[("PSO", "1 %")])).to_svg())
+    assert {"PSO", "1 %"} <= {text.text for text in root.iter(f"{NS}text")}
+    assert [title.text for title in root.iter(f"{NS}title")] == ["run 0: 1 %"]
 
 
 def test_a_solver_has_one_look_in_all_figures_of_a_study() -> None:

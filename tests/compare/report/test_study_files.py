@@ -12,8 +12,10 @@ from compare.analysis.comparison import compare_problems
 from compare.report import FurtherFiles
 from compare.report.document import Document
 from compare.report.latex import format_latex_table
+from compare.report.study_report import make_study_document
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
+from compare.study.settings import Manifest
 from compare.study.task import ProblemSpec, Stop, Task
 
 EMPTY = Document(title="", parts=())
@@ -33,15 +35,20 @@ def records() -> list[RunRecord]:
 
 def test_the_numbers_are_those_of_the_runs(records: list[RunRecord]) -> None:
     text = format_latex_table(compare_problems(records)[0])
-    rows = [line.removesuffix(r" \\").split(" & ") for line in text.splitlines() if line.startswith(("pso", "RD"))]
-    assert [row[0] for row in rows] == ["pso", r"RD\_1 50"] and rows[0][2].startswith("0.")
+    rows = [line.removesuffix(r" \\").split(" & ") for line in text.splitlines() if line.startswith(("PSO", "RD"))]
+    assert [row[0] for row in rows] == ["PSO", r"RD\_1 50"] and rows[0][2].startswith("0.")
     for row, solver in zip(rows, ("pso", "RD_1 50"), strict=True):
         values = [r.verdict.objective for r in records if r.solver == solver and r.verdict.feasible]
         assert row[1] == f"{len(values)}/6"
         assert row[2] == f"{max(values):.4f}" and row[6] == f"{min(values):.4f}"  # maximised
         assert (row[4], row[5]) == (f"{mean(values):.4f}", f"{stdev(values):.4f}")
     assert rows[0][3].startswith(r"\textbf{") and not rows[1][3].startswith(r"\textbf{") and float(rows[1][8]) < 0.05
-    assert "n = 6 runs" in text and "at most 1,000 evaluations" in text and "rank-sum" in text
+    assert (
+        ": 6 runs of each solver" in text
+        and r"0.89 \%" in text
+        and "at most 1,000 evaluations" in text
+        and "rank-sum" in text
+    )
     assert not re.search(r"(?<!\\)[%&_#](?! )", text.split(r"\begin{tabular}")[0].replace(r"\label{tab:walk12}", ""))
 
 
@@ -67,22 +74,26 @@ def test_runs_csv_is_written_again_where_it_exists(records: list[RunRecord], tmp
 
 
 @pytest.mark.slow
-def test_figures_are_one_column_wide_with_embedded_fonts(records: list[RunRecord], tmp_path: Path) -> None:
-    *figures, captions = FurtherFiles(figures=True).write(tmp_path, compare_problems(records), EMPTY)
-    for figure in figures:
-        content = figure.read_bytes()
-        box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+) ", content)
-        assert box and float(box[1]) == pytest.approx(244.8) and b"/FontFile2" in content
-    assert "n = 6 runs of each solver, at most 1,000 evaluations" in captions.read_text()
+def test_all_figures_are_written_for_papers_with_embedded_fonts(records: list[RunRecord], tmp_path: Path) -> None:
+    comparisons = compare_problems(records)
+    document = make_study_document(comparisons, Manifest(settings=None, sessions=()))
+    *figures, captions = FurtherFiles(figures=True).write(tmp_path, comparisons, document)
+    names = {"walk12-final", "walk12-gaits", "walk12-convergence", "walk12-runtime", "walk12-curves"}
+    assert {figure.name for figure in figures} == {f"{name}.{kind}" for name in names for kind in ("png", "pdf")}
+    assert all(b"/FontFile2" in figure.read_bytes() for figure in figures if figure.suffix == ".pdf")
+    text = captions.read_text()
+    assert text.count(r"\includegraphics") == 5 and "Best gait from the side" in text
+    assert text.count("walk12, 6 runs of each solver, at most 1,000 evaluations") == 5
 
 
 @pytest.mark.slow
 @pytest.mark.program("pdflatex")
 def test_latex_reads_it(records: list[RunRecord], tmp_path: Path) -> None:
-    FurtherFiles(latex=True, figures=True).write(tmp_path, compare_problems(records), EMPTY)
+    document = make_study_document(compare_problems(records), Manifest(settings=None, sessions=()))
+    FurtherFiles(latex=True, figures=True).write(tmp_path, compare_problems(records), document)
     (tmp_path / "page.tex").write_text(
         "\\documentclass{article}\n\\usepackage{booktabs,graphicx}\n\\begin{document}\n\\input{walk12-table}\n"
-        "\\input{walk12-figures}\n\\end{document}\n"
+        "\\input{figures}\n\\end{document}\n"
     )
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "page.tex"]
     for _ in range(2):  # the second time with the labels of the first
