@@ -38,7 +38,7 @@ records = import_runs(spec, Path("finals.csv"), "paper (MATLAB)")
 tasks = [Task(problem=spec, solver=algorithm, run=k) for algorithm in ("ipopt", "pso") for k in range(3)]
 (comparison,) = compare_problems([*records, *run_study(Study(tasks=tuple(tasks)))])
 for row in summarise(comparison):
-    claim = "no claim" if row["best_claimed"] is None else f"claims {row['best_claimed']:.4f} W"
+    claim = "no claim" if row["best_reported"] is None else f"claims {row['best_reported']:.4f} W"
     print(f"{row['solver']}: {row['feasible']} of {row['runs']} feasible, {claim}, judged {row['best']:.4f} W at best")
 
 # %%

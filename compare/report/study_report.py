@@ -9,7 +9,7 @@ from compare.analysis.headline import MANY, write_overall_headline
 from compare.analysis.units import name_solver
 from compare.drawing.figures import share_looks
 from compare.judge import evaluate
-from compare.report.document import Document, Prose, Section, make_table_section
+from compare.report.document import Document, Section, make_table_section
 from compare.report.study_files import FurtherFiles
 from compare.report.study_sections import (
     TESTS,
@@ -25,7 +25,7 @@ from compare.report.study_sections import (
     make_settings_section,
     split_title,
 )
-from compare.report.writing import escape_markdown, write_document
+from compare.report.writing import write_document
 from compare.study.evidence import CheckedRecords, Exclusion, read_evidence
 from compare.study.record import RunRecord, load_gait
 from compare.study.record_files import RECORDS, name_group
@@ -116,13 +116,12 @@ def _write_title(titles: Sequence[tuple[str, str]]) -> str:
     return f"{goal[:1].upper()}{goal[1:]}"
 
 
-def _describe_latest(sessions: Sequence[Session]) -> tuple[Prose, ...]:
+def _describe_latest(sessions: Sequence[Session]) -> tuple[str, ...]:
     """Return date, version and command of the latest session."""
     if not sessions:
         return ()
     session = sessions[-1]
-    version = escape_markdown(f"{session.started[:10]}, version {session.versions.get('nlp-gait', 'unknown')}")
-    return (Prose(f"{version}: `{session.command.replace('`', ' ')}`"),)
+    return (f"{session.started[:10]}, version {session.versions.get('nlp-gait', 'unknown')}: {session.command}",)
 
 
 def _describe_progress(manifest: Manifest, records: Sequence[RunRecord], excluded: int) -> tuple[str, ...]:

@@ -59,7 +59,7 @@ def test_a_page_plays_the_simulation(gait, tmp_path):
     page = tmp_path / "walk.html"
     assert f"wrote {page}" in nlp_gait("simulate", gait, "--page", page).stdout.replace("\n", "")
     text = page.read_text()
-    assert '"kind": "gaits"' in text or '"kind":"gaits"' in text
+    assert '{"gaits": [{' in text
     assert "engine" in text and "<canvas" not in text  # its script makes the canvas
 
 
@@ -72,7 +72,7 @@ def test_export_writes_a_page(gait):
     gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.3}}))
     for _ in range(2):  # its own file may be replaced
         nlp_gait("export", gait, "--to", "html")
-    assert "support polygon" in gait.with_suffix(".html").read_text()
+    assert ">right leg</text>" in gait.with_suffix(".html").read_text()
 
 
 def test_a_film_is_made_without_a_display(gait, tmp_path):

@@ -160,7 +160,7 @@ def test_the_page_begins_with_the_answer_and_folds_the_rest(page: str, folder: P
     assert (
         (folder / "report.md")
         .read_text(encoding="utf-8")
-        .startswith("# walk: power\n\n2026-01-01, version 1.0: `nlp-gait")
+        .startswith("# walk: power\n\n2026-01-01, version 1.0: nlp-gait compare")
     )
     folded = re.findall(r"<details><summary><h2>(.*?)</h2>", page)
     assert len(folded) == 5 and "All problems" not in page
