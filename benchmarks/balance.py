@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from time import process_time
 
@@ -21,7 +20,9 @@ import numpy as np
 from benchmarks.engine.gaits import DIRECTIONS
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.formulation import load_result
-from nlp_gait.simulation.drive import Drive, choose_feedback
+from nlp_gait.simulation.balance.controller import Balance
+from nlp_gait.simulation.balance.drives import choose_feedback
+from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import Bumps
 from nlp_gait.simulation.plan import Plan, make_plan
 from nlp_gait.simulation.simulate import TIME_STEP, Conditions, Push, Run
@@ -107,10 +108,8 @@ def tabulate_conditions(paths: list[str]) -> Iterator[str]:
             for world, (make, noisy) in WORLDS.items():
                 walks = []
                 for seed in SEEDS if world in SEEDED else (0,):
-                    drive = choose_feedback(Drive(), feedback)
-                    if noisy and drive.balance is not None:
-                        drive = replace(drive, balance=replace(drive.balance, noise=1.0, delay_s=0.004, seed=seed))
-                    walks.append((make(seed), drive))
+                    noise = {"noise": 1.0, "delay_s": 0.004, "seed": seed} if noisy else {}
+                    walks.append((make(seed), Drive(feedback=Balance(**noise)) if feedback == "balance" else Drive()))
                 row.append(describe_walks(plan, walks))
             yield cells(Path(path).stem, feedback, *row)
 
@@ -140,8 +139,8 @@ def tabulate_rest(paths: list[str]) -> Iterator[str]:
             run.advance(plan.duration_s + 2.0)
             step_ms[feedback] = 1e3 * (process_time() - begin) * TIME_STEP / run.time_s
             tick = ""
-            if drive.balance is not None:
-                tick = f"{(step_ms['balance'] - step_ms['none']) * drive.balance.period_s / TIME_STEP:.2f}"
+            if feedback == "balance":
+                tick = f"{(step_ms['balance'] - step_ms['none']) * Balance().period_s / TIME_STEP:.2f}"
             if run.fell_at_s is not None:
                 yield cells(name, feedback, f"falls at {run.fell_at_s:.1f} s", "", "", "", tick)
                 continue

@@ -30,7 +30,8 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.plan_walk import MARGINS, WalkSettings
 from nlp_gait.errors import GaitError
 from nlp_gait.formulation import load_result
-from nlp_gait.simulation.drive import Drive, choose_feedback
+from nlp_gait.simulation.balance.drives import choose_feedback
+from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import measure_walk
 from nlp_gait.simulation.plan import Plan, make_plan
 from nlp_gait.simulation.simulate import Push, Run, simulate_plan

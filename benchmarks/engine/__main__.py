@@ -19,7 +19,6 @@ TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "published": agreement.published,
     "gains": sensitivity.gains,
     "disturbed": feedback.disturbed,
-    "feedback": feedback.settings,
     "stairs": other_robots.stairs,
 }
 

@@ -1,17 +1,16 @@
-"""Effects of balance feedback if the world or the robot differs from the plan, and effects of its settings."""
+"""Effects of balance feedback if the world or the robot differs from the plan."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 
 from benchmarks.engine.agreement import STEPS
 from benchmarks.engine.gaits import DIRECTIONS, optimal_cycles
 from benchmarks.engine.markdown import cells, header
 from benchmarks.engine.sensitivity import SPEED
+from nlp_gait.simulation.balance.controller import Balance
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.measurements import Walk, measure_walk
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import Conditions, Push, simulate_plan
@@ -33,38 +32,9 @@ CONDITIONS: Mapping[str, Conditions] = {
         for direction, (x, y) in DIRECTIONS.items()
     },
 }
-DEFAULT = Feedback()
-NOISES = ("position_noise_m", "velocity_noise_m_s", "tilt_noise_rad", "rate_noise_rad_s")
-STRENGTHS = ("spring", "damper", "tilt_spring", "tilt_damper")
 
 
-def scale_strength(feedback: Feedback, factor: float) -> Feedback:
-    """Return the feedback with springs and dampers times a factor."""
-    return replace(feedback, **{name: factor * getattr(feedback, name) for name in STRENGTHS})
-
-
-def scale_noise(feedback: Feedback, factor: float) -> Feedback:
-    """Return the feedback with the noise of its sensors times a factor."""
-    return replace(feedback, **{name: factor * getattr(feedback, name) for name in NOISES})
-
-
-VARIANTS: Mapping[str, Feedback | None] = {
-    "open loop": None,
-    "default": DEFAULT,
-    "another seed": replace(DEFAULT, seed=1),
-    "ideal sensors": replace(scale_noise(DEFAULT, 0.0), delay_s=0.0),
-    "twice the noise": scale_noise(DEFAULT, 2.0),
-    "delay 20 ms": replace(DEFAULT, delay_s=0.02),
-    "half the springs and dampers": scale_strength(DEFAULT, 0.5),
-    "twice the springs and dampers": scale_strength(DEFAULT, 2.0),
-    "no growth": replace(DEFAULT, growth_per_s=0.0),
-    "growth without limit": replace(DEFAULT, growth_limit=1e3),
-}
-FEW_STEPS = 4
-HARD = ("as planned", "floor rises 3 degrees backward", "drive stiffness -30 %", f"push of {IMPULSE:g} N s left")
-
-
-def walked(steps: int, conditions: Conditions, feedback: Feedback | None) -> Walk:
+def walked(steps: int, conditions: Conditions, feedback: Balance | None) -> Walk:
     """So many steps of the cheapest cycle at ``SPEED``."""
     plan, drive = make_plan(optimal_cycles((SPEED,))[SPEED], steps), Drive(feedback=feedback)
     return measure_walk(plan, simulate_plan(plan, conditions, drive), drive, steps)
@@ -85,12 +55,4 @@ def disturbed() -> Iterator[str]:
     columns = ("steps", "J/m", "distance")
     yield header("condition", *(f"open loop: {columns[0]}", *columns[1:]), *(f"feedback: {columns[0]}", *columns[1:]))
     for label, conditions in CONDITIONS.items():
-        yield cells(label, *(text for own in (None, DEFAULT) for text in format_walk(walked(STEPS, conditions, own))))
-
-
-def settings() -> Iterator[str]:
-    """Four steps with other settings of the feedback: J per planned metre, largest tilt."""
-    yield header("feedback", *HARD)
-    for label, feedback in VARIANTS.items():
-        walks = [walked(FEW_STEPS, CONDITIONS[name], feedback) for name in HARD]
-        yield cells(label, *(f"{format_walk(walk)[1]}, {walk.measurements.largest_tilt_deg:.1f} deg" for walk in walks))
+        yield cells(label, *(text for own in (None, Balance()) for text in format_walk(walked(STEPS, conditions, own))))

@@ -32,10 +32,7 @@ DRIVE = (
     "40 ms, nothing fed forward. Or a file with settings of drive and feedback."
 )
 TORQUES = "urdf, stall or continuous: published limits differ; joints without motor data have the file's."
-FEEDBACK = (
-    "none, in open loop; balance: footholds, times of steps and torques of the whole body by the measured state (extra sim); "
-    "torso-spring: balance by measured place and attitude of the torso."
-)
+FEEDBACK = "none, in open loop; balance: footholds, times of steps and torques of the whole body by the measured state (extra sim)."
 SLOPE = "Rise of the floor forward and to the left, added to the slope of a walk planned for one; each below 45."
 LIVE = "Show it in MuJoCo's viewer in real time; arrow keys push the robot forward, backward, to the left and to the right."
 PUSH = "Impulse on the torso, forward and to the left [N s], and its begin [s] (default: in the middle)."
@@ -51,7 +48,7 @@ class DriveOptions:
 
     def make(self) -> Drive:
         """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
-        from nlp_gait.simulation.drive import choose_feedback, load_drive
+        from nlp_gait.simulation.balance.drives import choose_feedback, load_drive
 
         drive = load_drive(self.drive)
         if self.torque_limits is not None:
@@ -120,12 +117,12 @@ def simulate(
     """Simulate a gait in MuJoCo (extra `sim`), open loop or with feedback, and compare it with the model's predictions.
 
     Examples, after `nlp-gait solve nao-ssp --out best.json`: `nlp-gait simulate best.json --page walk.html`,
-    `nlp-gait simulate best.json --push 0.5,0 --feedback torso-spring`, `nlp-gait simulate best.json --drive slow.toml` with
+    `nlp-gait simulate best.json --push 0.5,0 --feedback balance`, `nlp-gait simulate best.json --drive slow.toml` with
 
         period_s = 0.02               # feed_forward = "torque", interpolation = "linear", torque_limits = "urdf"
 
-        [feedback]                    # leave it out for open loop
-        delay_s = 0.02
+        [balance]                     # leave it out for open loop
+        delay_s = 0.004
 
     A table `[controller]` with `kp`, `kd` and `gravity_compensation` instead is a PD controller with equal gains of all joints.
     """
@@ -193,7 +190,7 @@ def _report(plan: Plan, trace: Simulation, drive: Drive, pushes: list[Push]) -> 
     if walk is not None:
         data |= {"walked_m": walk.walked_m, "planned_m": walk.planned_m, "energy_J": walk.engine_J}
         data["walk"] = walk.course()
-        parts.append(_describe_course(walk, drive.feedback is None and drive.balance is None))
+        parts.append(_describe_course(walk, drive.feedback is None))
     if plan.ground:
         climb = measure_climb(plan, trace)
         data["climb"] = asdict(climb)

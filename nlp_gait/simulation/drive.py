@@ -1,22 +1,15 @@
 """Position drives of the simulated robot: stiffness, torque limits, set-points, and feed-forward."""
 
-import math
-import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 import numpy as np
 
-from nlp_gait.decoding import decode
-from nlp_gait.errors import InputError, unknown
-from nlp_gait.files import read_text
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Joint
-from nlp_gait.simulation.balance import Balance, WholeBodyBalance
-from nlp_gait.simulation.engine import check_period
-from nlp_gait.simulation.feedback import BalanceController, Feedback
+from nlp_gait.simulation.engine import PERIODS_S, check_range
 from nlp_gait.simulation.joint_controller import GravityCompensation, JointController
 from nlp_gait.simulation.plan import Plan
 
@@ -32,6 +25,8 @@ FEED_FORWARD = ("torque", "velocity", "none")  # torque includes velocity
 class Corrector(Protocol):
     """Corrects the set-points of one simulation."""
 
+    stepped_at_s: float | None  #: begin of a step at rest, None without one
+
     def fork(self) -> Self:
         """Return a copy for a simulation that begins in the middle of this one."""
 
@@ -40,6 +35,13 @@ class Corrector(Protocol):
 
     def correct(self, command: Array, data: Any) -> Array:
         """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
+
+
+class Feedback(Protocol):
+    """Settings of a feedback."""
+
+    def make_corrector(self, plan: Plan, drive: "Drive", model: Any) -> Corrector:
+        """Return what corrects the set-points of one simulation of the plan, whose nominal model this is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,24 +60,20 @@ class Drive:
     interpolation: str = "linear"
     feed_forward: str = "torque"  #: ``torque`` (and velocity), ``velocity``, or ``none``
     torque_limits: str = "urdf"  #: source of the limits
-    feedback: Feedback | None = None  #: a spring at the torso corrects the set-points; None for open loop
-    balance: Balance | None = None  #: whole-body balance commands torques by the set-points
+    feedback: Feedback | None = None  #: corrects the set-points; None for open loop
     controller: JointController | None = None  #: gains instead of the motors' stiffness, on desired angles and rates
 
     def __post_init__(self) -> None:
-        for name in ("full_error_rad", "time_constant_s", "period_s"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise InputError(f"{name} of a drive must be > 0, got {value!r}")
-        check_period("drive", self.period_s)
+        check_range("drive", "full_error_rad", self.full_error_rad, 1e-9, 1e3)
+        check_range("drive", "time_constant_s", self.time_constant_s, 1e-6, 1e3)
+        check_range("drive", "period_s", self.period_s, *PERIODS_S)
         allowed = {"interpolation": INTERPOLATIONS, "feed_forward": FEED_FORWARD, "torque_limits": TORQUE_LIMITS}
         for name, names in allowed.items():
             if getattr(self, name) not in names:
                 words = name.replace("_", " ")
                 raise InputError(f"{words} of a drive must be one of {', '.join(names)}, got {getattr(self, name)!r}")
-        corrections = [name for name in ("controller", "feedback", "balance") if getattr(self, name) is not None]
-        if len(corrections) > 1:
-            raise InputError(f"a drive has one of controller, feedback and balance, got {' and '.join(corrections)}")
+        if self.controller is not None and self.feedback is not None:
+            raise InputError("a drive has a controller or a feedback, got both")
 
     def stiffness(self, joint: Joint) -> float:
         """Return the stiffness of a joint's drive [Nm/rad]."""
@@ -117,15 +115,7 @@ class Drive:
         """Return what corrects the set-points of one simulation, None in open loop; ``model`` is the nominal one."""
         if self.controller is not None and self.controller.gravity_compensation > 0.0:
             return GravityCompensation(self.controller, plan, model)
-        if self.feedback is None and self.balance is None:
-            return None
-        joints = [plan.robot.joint(name) for name in plan.joints]
-        stiffness, damping, limits = (
-            np.array([find(joint) for joint in joints]) for find in (self.stiffness, self.damping, self.torque_limit)
-        )
-        if self.balance is not None:
-            return WholeBodyBalance(self.balance, plan, (stiffness, damping), limits, model)
-        return None if self.feedback is None else BalanceController(self.feedback, plan, stiffness, model)
+        return None if self.feedback is None else self.feedback.make_corrector(plan, self, model)
 
     def torque_limit(self, joint: Joint) -> float:
         """Return the torque limit of a joint [Nm]; the paper's controller has none."""
@@ -143,37 +133,5 @@ def find_stall_torque(joint: Joint) -> float:
     return joint.torque_limit_Nm if joint.motor is None else joint.motor.stall_torque_Nm
 
 
-def load_drive(name: str) -> Drive:
-    """Return the drive of a name in ``DRIVES``, or of a TOML file.
-
-    The file has fields of ``Drive``, and those of ``Feedback`` in a table ``[feedback]``, of ``Balance`` in a table
-    ``[balance]``, or of ``JointController`` in a table ``[controller]``.
-
-    Raises UnknownNameError, or InputError for a file or setting that is not allowed.
-    """
-    if not name.endswith(".toml"):
-        if name not in DRIVES:
-            raise unknown("drive", name, DRIVES)
-        return DRIVES[name]
-    text = read_text(Path(name), "drive")
-    try:
-        return decode(Drive, tomllib.loads(text))
-    except ValueError as error:
-        raise InputError(f"drive {name!r}: {error}") from error
-
-
 # By name: as NAO's own controller, and set-points held for 40 ms, the sampling of the paper's gaits.
 DRIVES = {"feed-forward": Drive(), "held": Drive(period_s=0.04, interpolation="held", feed_forward="none")}
-FEEDBACKS = {"none": None, "torso-spring": Feedback(), "balance": Balance()}
-
-
-def choose_feedback(drive: Drive, name: str) -> Drive:
-    """Return a drive with the feedback of a name in ``FEEDBACKS``; raises UnknownNameError."""
-    if name not in FEEDBACKS:
-        raise unknown("feedback", name, FEEDBACKS)
-    chosen = FEEDBACKS[name]
-    return replace(
-        drive,
-        feedback=chosen if isinstance(chosen, Feedback) else None,
-        balance=chosen if isinstance(chosen, Balance) else None,
-    )

@@ -91,12 +91,10 @@ def _list_contacts(data: Any, addresses: Addresses) -> tuple[Array, Array, Array
 
 
 # Between two commands of a controller: NAO's has cycles of 10 ms, the engine steps of 0.5 ms.
-SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 1e-4, 1.0
+PERIODS_S = (1e-4, 1.0)
 
 
-def check_period(owner: str, period_s: float) -> None:
-    """Check the time between two commands of a controller; raises InputError."""
-    if not SHORTEST_PERIOD_S <= period_s <= LONGEST_PERIOD_S:
-        raise InputError(
-            f"period_s of a {owner} must be from {SHORTEST_PERIOD_S:g} to {LONGEST_PERIOD_S:g} s, got {period_s!r}"
-        )
+def check_range(owner: str, name: str, value: float, least: float, most: float) -> None:
+    """Check a setting; raises InputError."""
+    if not least <= value <= most:  # NaN fails too
+        raise InputError(f"{name} of a {owner} must be from {least:g} to {most:g}, got {value!r}")

@@ -1,14 +1,12 @@
 """PD controller of the joints with equal gains, and compensation of gravity: (50) of Bhardwaj et al."""
 
-import math
 from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
 
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.simulation.engine import Addresses, load_mujoco
+from nlp_gait.simulation.engine import Addresses, check_range, load_mujoco
 from nlp_gait.simulation.plan import SIDES, Plan
 
 
@@ -27,14 +25,15 @@ class JointController:
     gravity_compensation: float = 0.0  # share of gravity, at the measured posture
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.kp < math.inf and 0.0 <= self.kd < math.inf):
-            raise InputError(f"kp of a controller must be > 0 and kd >= 0, got {self.kp!r} and {self.kd!r}")
-        if not 0.0 <= self.gravity_compensation <= 1.0:
-            raise InputError(f"gravity_compensation must be within [0, 1], got {self.gravity_compensation!r}")
+        check_range("controller", "kp", self.kp, 1e-6, 1e9)
+        check_range("controller", "kd", self.kd, 0.0, 1e9)
+        check_range("controller", "gravity_compensation", self.gravity_compensation, 0.0, 1.0)
 
 
 class GravityCompensation:
     """Shift of the set-points by which position drives carry the robot's weight over one foot, in one simulation."""
+
+    stepped_at_s: float | None = None
 
     def __init__(self, controller: JointController, plan: Plan, model: Any) -> None:
         self._controller, self._plan, self._model = controller, plan, model

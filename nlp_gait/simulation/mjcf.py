@@ -1,6 +1,5 @@
 """Robots and their world in MJCF, MuJoCo's model format; needs no MuJoCo."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -9,12 +8,12 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from nlp_gait.errors import InputError
 from nlp_gait.formulation.display import Tread
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Link
 from nlp_gait.robots.tree import TreeBody, make_tree
 from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.engine import check_range
 from nlp_gait.simulation.plan import SIDES, Plan
 from nlp_gait.simulation.shapes import Prism, Shape, make_shapes
 from nlp_gait.symbolic.dynamics import tilt_gravity
@@ -44,8 +43,7 @@ class Bumps:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.height_m < math.inf:
-            raise InputError(f"height_m of bumps must be > 0, got {self.height_m!r}")
+        check_range("floor with bumps", "height_m", self.height_m, 1e-6, 1.0)
 
 
 TILE, TILE_MARGIN = 0.15, 0.5  # side of a tile, and ground around the planned soles that has tiles [height of the hip]

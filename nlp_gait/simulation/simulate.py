@@ -9,9 +9,8 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Columns, Signals, make_vector_columns
-from nlp_gait.simulation.balance import WholeBodyBalance
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.engine import Addresses, load_mujoco, measure_pressure, place_root
+from nlp_gait.simulation.engine import Addresses, check_range, load_mujoco, measure_pressure, place_root
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, Bumps, make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
 
@@ -39,8 +38,9 @@ class Push:
     duration_s: float = 0.05  # of the constant force
 
     def __post_init__(self) -> None:
-        if not all(map(math.isfinite, (*self.impulse_Ns, self.start_s or 0.0))):
-            raise InputError(f"a push must be finite, got {self.impulse_Ns} N s at {self.start_s} s")
+        for impulse in self.impulse_Ns:
+            check_range("push", "impulse_Ns", impulse, -1e6, 1e6)
+        check_range("push", "start_s", self.start_s or 0.0, 0.0, 1e6)
 
     def force(self, since_s: float) -> tuple[float, float]:
         """Return the force (x, y) at a time since its begin [N]."""
@@ -63,9 +63,7 @@ class Conditions:
 
     def __post_init__(self) -> None:
         for name in ("friction", "mass_factor", "stiffness_factor"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise InputError(f"{name} must be > 0, got {value!r}")
+            check_range("simulation", name, getattr(self, name), 1e-6, 1e6)
         if not all(abs(slope) < math.pi / 4 for slope in self.slope_rad):
             raise InputError(f"slope_rad must be within +-pi/4, got {self.slope_rad}")
 
@@ -192,8 +190,8 @@ class Run:
         measured = dict(zip(("t", "set_points", "states", "qd", "torque", *COLUMNS), columns, strict=True))
         measured["q"] = measured["states"][:, self._addresses.angles]
         measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows have its cosine
-        stepped = self._corrector.stepped_at_s if isinstance(self._corrector, WholeBodyBalance) else None
-        return Simulation(**measured, fell_at_s=self.fell_at_s, stepped_at_s=stepped)
+        stepped_at_s = None if self._corrector is None else self._corrector.stepped_at_s
+        return Simulation(**measured, fell_at_s=self.fell_at_s, stepped_at_s=stepped_at_s)
 
 
 def simulate_plan(

@@ -1,6 +1,9 @@
 """Balance of the whole body: footholds in closed form, torques against the engine, and walks that open loop does not survive."""
 
+import json
+import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,19 +14,21 @@ from scipy.optimize import linprog
 import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result
-from nlp_gait.simulation.footholds import StepLimits, choose_step, clip_to_soles, find_shift
+from nlp_gait.simulation.balance.footholds import StepLimits, choose_step, clip_to_soles, find_shift
 from nlp_gait.simulation.plan import Plan, make_plan
+from tests.compare.cli.calls import as_json, one_sentence
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("daqp")
 
-from nlp_gait.simulation.balance import Balance, WholeBodyBalance  # noqa: E402
+from nlp_gait.simulation.balance.controller import Balance, WholeBodyBalance  # noqa: E402
+from nlp_gait.simulation.balance.drives import load_drive  # noqa: E402
+from nlp_gait.simulation.balance.reference import WalkReference, compute_left_load  # noqa: E402
+from nlp_gait.simulation.balance.whole_body import Targets, Torques, WholeBodyQP  # noqa: E402
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.engine import Addresses, place_root  # noqa: E402
 from nlp_gait.simulation.mjcf import Bumps  # noqa: E402
 from nlp_gait.simulation.simulate import Conditions, Push, Run, prepare  # noqa: E402
-from nlp_gait.simulation.walk_reference import WalkReference  # noqa: E402
-from nlp_gait.simulation.whole_body import Targets, Torques, WholeBodyQP  # noqa: E402
 
 LIMITS = StepLimits(
     rate=6.0,
@@ -195,7 +200,7 @@ def test_a_robot_at_rest_steps_where_no_zmp_brings_it_back_and_a_foothold_does(
 ) -> None:
     reach, error = settings
     push = Push(impulse_Ns=(impulse_Ns, 0.0), start_s=0.6, duration_s=0.1)
-    run = Run(standing, Conditions(push=push), Drive(balance=Balance(hold=0.0, reach=reach, step_error=error)))
+    run = Run(standing, Conditions(push=push), Drive(feedback=Balance(hold=0.0, reach=reach, step_error=error)))
     assert run.advance(0.6)
     balance = run._corrector
     assert isinstance(balance, WholeBodyBalance)
@@ -218,7 +223,7 @@ def test_a_pushed_walk_stands_with_it_and_falls_without(
     plan: Plan, impulse_Ns: tuple[float, float], share: float
 ) -> None:
     conditions = Conditions(push=Push(impulse_Ns=impulse_Ns, start_s=share * plan.duration_s, duration_s=0.1))
-    alone, balanced = (Run(plan, conditions, drive).finish() for drive in (Drive(), Drive(balance=Balance())))
+    alone, balanced = (Run(plan, conditions, drive).finish() for drive in (Drive(), Drive(feedback=Balance())))
     assert alone.fell_at_s is not None and balanced.fell_at_s is None
 
 
@@ -227,7 +232,7 @@ def test_bumps_noise_and_delay_act_and_the_same_seed_gives_the_same_walk(plan: P
     settings = Balance(noise=1.0, delay_s=0.004)
     bumpy = Conditions(bumps=Bumps(height_m=0.004))
     first, again, other, flat = (
-        advance(Run(plan, conditions, Drive(balance=balance)))
+        advance(Run(plan, conditions, Drive(feedback=balance)))
         for conditions, balance in (
             (bumpy, settings),
             (bumpy, settings),
@@ -244,11 +249,47 @@ def test_a_push_after_the_end_is_refused(standing: Plan) -> None:
         Run(standing, Conditions(push=Push(impulse_Ns=(1.0, 0.0), start_s=2.0)))
 
 
-def test_settings_that_are_not_allowed_are_refused() -> None:
-    for name, value in (("dcm_gain", -1.0), ("edge", float("nan")), ("period_s", 2.0)):
-        with pytest.raises(InputError, match=f"{name} of a balance feedback must be"):
-            Balance(**{name: value})
-    with pytest.raises(InputError, match="a drive has one of controller, feedback and balance"):
-        from nlp_gait.simulation.feedback import Feedback
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[balance]\ndcm_gain = -1.0", "dcm_gain of a balance feedback must be from 0 to 1000, got -1.0"),
+        ("[balance]\nedge = nan", "edge of a balance feedback must be from 0 to 1000, got nan"),
+        ("[balance]\nperiod_s = 2.0", "period_s of a balance feedback must be from 0.0001 to 1, got 2.0"),
+        ("[balance]\ndelay_s = 1e308", "delay_s of a balance feedback must be from 0 to 1, got 1e+308"),
+        ("[balance]\nseed = -1", "seed of a balance feedback must be from 0 to"),
+        ("full_error_rad = 1e308", "full_error_rad of a drive must be from 1e-09 to 1000, got 1e+308"),
+        ("time_constant_s = 0", "time_constant_s of a drive must be from 1e-06 to 1000, got 0"),
+        ("[controller]\nkp = 1e308\nkd = 1", "kp of a controller must be from 1e-06 to 1e+09, got 1e+308"),
+        ("[balance]\n[controller]\nkp = 1\nkd = 1", "a drive has a controller or a feedback, got both"),
+        ("[feedback]\ndelay_s = 0.1", "unknown key 'feedback'"),
+    ],
+)
+def test_settings_in_a_file_that_are_not_allowed_are_refused(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "drive.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=re.escape(words)):
+        load_drive(str(path))
 
-        Drive(balance=Balance(), feedback=Feedback())
+
+def test_the_load_passes_from_foot_to_foot(plan: Plan) -> None:
+    """In single support one foot has it all; in between, the point that divides their distance is nearest to the ZMP."""
+    single, double, period = 0.4, 0.56565, 0.96565
+    times = np.array([0.2, single + 0.25 * double, single + 0.75 * double, period + 0.2])
+    feet = np.stack([plan.at(f"{side}_foot", times)[:, :2] for side in ("left", "right")])
+    share = compute_left_load(plan, times, feet)
+    assert share[0] == 1.0 > share[1] > share[2] > share[3] == 0.0
+    nearest = share[1] * feet[0, 1] + (1.0 - share[1]) * feet[1, 1]
+    np.testing.assert_allclose((nearest - plan.at("zmp", times)[1]) @ (feet[0] - feet[1])[1], 0.0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_the_commands_take_feedback_and_conditions(cycle: Result, tmp_path: Path) -> None:
+    result = tmp_path / "cycle.json"
+    result.write_text(json.dumps({"problem": "nao-cycle", "x": cycle.problem.by_name(cycle.x)}))
+    flags = ["--steps", "1", "--slope-deg=-3,0", "--stiffness-factor", "0.9"]
+
+    def torques(*more: str) -> float:
+        return float(as_json("simulate", result, *flags, *more)["walk"]["engine_J_per_planned_m"])
+
+    assert torques("--feedback", "balance") != torques()
+    assert "unknown feedback 'telepathy'" in one_sentence("simulate", result, "--feedback", "telepathy")

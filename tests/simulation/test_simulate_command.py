@@ -16,8 +16,9 @@ from tests.compare.cli.calls import as_json, one_sentence
 mujoco = pytest.importorskip("mujoco")
 pytestmark = pytest.mark.slow  # each gait is simulated
 
-from nlp_gait.simulation.balance import Balance  # noqa: E402
-from nlp_gait.simulation.drive import Drive, load_drive  # noqa: E402
+from nlp_gait.simulation.balance.controller import Balance  # noqa: E402
+from nlp_gait.simulation.balance.drives import load_drive  # noqa: E402
+from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import Measurements, measure, measure_climb  # noqa: E402
 from nlp_gait.simulation.mjcf import Bumps  # noqa: E402
 from nlp_gait.simulation.plan import SIDES, Plan, make_plan  # noqa: E402
@@ -98,7 +99,7 @@ def climb_on_bumps(plan: Plan) -> None:
     climb, alone = (
         measure_climb(plan, simulate_plan(plan, conditions, drive))
         for conditions, drive in (
-            (worse, Drive(balance=Balance(noise=1.0, delay_s=0.004, seed=1))),
+            (worse, Drive(feedback=Balance(noise=1.0, delay_s=0.004, seed=1))),
             (Conditions(bumps=worse.bumps), Drive()),
         )
     )
@@ -109,7 +110,7 @@ def climb_on_bumps(plan: Plan) -> None:
 def test_balance_refuses_a_plan_that_leans_on_its_toe() -> None:
     plan = make_plan(Result(problem=(problem := nlp_gait.load("stairs-plan")), x=problem.check_x(FREE)))
     with pytest.raises(InputError, match="needs the ZMP on the sole in single support; this plan's is .* on the toe"):
-        simulate_plan(plan, drive=Drive(balance=Balance()))
+        simulate_plan(plan, drive=Drive(feedback=Balance()))
 
 
 def test_tracked_steps_climb_with_stiff_gains_and_fall_with_the_papers() -> None:

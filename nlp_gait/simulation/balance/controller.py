@@ -7,15 +7,14 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.simulation.engine import Addresses, check_period, load_mujoco, measure_loads
-from nlp_gait.simulation.feedback import to_rotation_vector
-from nlp_gait.simulation.footholds import Step, StepLimits, choose_step, clip_to_soles
+from nlp_gait.simulation.balance.footholds import Step, StepLimits, choose_step, clip_to_soles
+from nlp_gait.simulation.balance.reference import SupportPhase, WalkReference
+from nlp_gait.simulation.balance.sampler import Sampler
+from nlp_gait.simulation.balance.whole_body import Targets, WholeBodyQP
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.engine import PERIODS_S, Addresses, check_range, load_mujoco, measure_loads
 from nlp_gait.simulation.plan import Plan
-from nlp_gait.simulation.sampler import Sampler
-from nlp_gait.simulation.walk_reference import SupportPhase, WalkReference
-from nlp_gait.simulation.whole_body import Targets, WholeBodyQP
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,11 +54,14 @@ class Balance:
     damp: float = 0.5  # share of the planned rates that drives hold
 
     def __post_init__(self) -> None:
+        limits = {"period_s": PERIODS_S, "delay_s": (0.0, 1.0), "seed": (0, 2**53)}
         for setting in fields(self):
-            value = getattr(self, setting.name)
-            if not 0.0 <= value < math.inf:
-                raise InputError(f"{setting.name} of a balance feedback must be >= 0, got {value!r}")
-        check_period("balance feedback", self.period_s)
+            least, most = limits.get(setting.name, (0.0, 1e3))
+            check_range("balance feedback", setting.name, getattr(self, setting.name), least, most)
+
+    def make_corrector(self, plan: Plan, drive: Drive, model: Any) -> "WholeBodyBalance":
+        """Return the controller of one simulation, whose nominal model this is; raises InputError for an unsuitable plan."""
+        return WholeBodyBalance(self, plan, drive, model)
 
 
 class RobotState(NamedTuple):
@@ -240,13 +242,14 @@ class StepClock:
 
 
 class WholeBodyBalance:
-    """Controller of one simulation: corrects the set-points of drives whose stiffness and damping (J,) it knows."""
+    """Controller of one simulation: corrects the set-points of a drive whose stiffness, damping and limits it knows."""
 
-    def __init__(
-        self, settings: Balance, plan: Plan, gains: tuple[Array, Array], torque_limits: Array, model: Any
-    ) -> None:
+    def __init__(self, settings: Balance, plan: Plan, drive: Drive, model: Any) -> None:
         self._settings, self._engine = settings, load_mujoco()
-        self._stiffness, self._damping = gains
+        joints = [plan.robot.joint(name) for name in plan.joints]
+        self._stiffness = np.array([drive.stiffness(joint) for joint in joints])
+        self._damping = np.array([drive.damping(joint) for joint in joints])
+        torque_limits = np.array([drive.torque_limit(joint) for joint in joints])
         self._model = copy.deepcopy(model)
         self._model.opt.disableflags |= int(self._engine.mjtDisableBit.mjDSBL_CONTACT)
         self._data = self._engine.MjData(self._model)
@@ -261,9 +264,9 @@ class WholeBodyBalance:
         self._sampler = Sampler[RobotState](
             settings.period_s, settings.delay_s, settings.seed, float(model.opt.timestep)
         )
-        root, joints = plan.root_axes, len(plan.joints)
         deviations = [
-            np.append(np.repeat(sizes[:2], 3)[root], np.full(joints, sizes[2])) for sizes in (NOISE, RATE_NOISE)
+            np.append(np.repeat(sizes[:2], 3)[plan.root_axes], np.full(len(joints), sizes[2]))
+            for sizes in (NOISE, RATE_NOISE)
         ]
         self._noise = settings.noise * np.array(deviations)
         self.clock, self._plan_s = StepClock(settings, reference), reference.duration_s
@@ -439,3 +442,8 @@ class WholeBodyBalance:
 def _track(rate: float, error: Any, rate_error: Any, acceleration: Any = 0.0) -> Any:
     """Return the acceleration of critically damped tracking with a natural frequency [1/s]."""
     return acceleration + rate**2 * error + 2.0 * rate * rate_error
+
+
+def to_rotation_vector(turn: Array) -> Array:
+    """Return axis times angle (3,) of a small rotation matrix (3, 3), to first order [rad]."""
+    return np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2.0

@@ -8,8 +8,8 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError
 from nlp_gait.formulation import Array
+from nlp_gait.simulation.balance.reference import WalkReference
 from nlp_gait.simulation.engine import load_mujoco
-from nlp_gait.simulation.walk_reference import WalkReference
 
 UNBOUNDED = 1e9
 REGULARISATION = 1e-8

@@ -10,7 +10,6 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.simulation.engine import Addresses, load_mujoco, place_root
-from nlp_gait.simulation.feedback import compute_load_shares
 from nlp_gait.simulation.plan import SIDES, Plan
 
 STEP_S = 0.002  # of the grid
@@ -20,6 +19,7 @@ SMOOTHING = 11  # samples over which the accelerations of the centre of mass are
 # swinging foot [h], and share of the swing after which it is down.
 PUSH_OFF, SWING, SUPPORT, LAST_SUPPORT = 0.4, 1.4, 0.5, 2.0
 LIFT, DOWN = 0.06, 0.9
+TOGETHER_M = 1e-3  # feet of a planar robot nearer than this share the load equally
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class WalkReference:
         acceleration = np.stack(
             [np.convolve(np.pad(a, pad, mode="edge"), kernel, "valid") for a in acceleration.T], axis=1
         )
-        zmp, load = plan.at("zmp", times), compute_load_shares(plan, times, places)[:, 0]
+        zmp, load = plan.at("zmp", times), compute_left_load(plan, times, places)
         arrays = {
             "q": plan.at("q", times),
             "qd": plan.rate("q", times),
@@ -190,6 +190,15 @@ def _find_ankle_reach(plan: Plan, model: Any, torque_limits: Array) -> Array:
         roll, pitch, _ = np.abs(data.xaxis[joints]).T @ limits / (model.body_subtreemass[0] * plan.gravity)
         reach[i] = pitch, pitch, roll, roll
     return reach
+
+
+def compute_left_load(plan: Plan, times: Array, places: Array) -> Array:
+    """Return the planned share of the load on the left foot (T,): the ZMP divides it between two that bear, at (2, T, 2) [m]."""
+    (left, right), (on_left, on_right) = places, (plan.bears(side, times) for side in SIDES)
+    apart = left - right
+    ahead, squared = ((plan.at("zmp", times) - right) * apart).sum(axis=1), (apart**2).sum(axis=1)
+    between = np.divide(ahead, squared, out=np.full(len(times), 0.5), where=squared > TOGETHER_M**2)
+    return np.where(on_right == 0.0, 1.0, np.where(on_left == 0.0, 0.0, np.clip(between, 0.0, 1.0)))
 
 
 def _split(times: Array, bears: Any) -> list[SupportPhase]:

@@ -1,0 +1,1 @@
+"""Balance feedback of planned walks, a `Corrector` of simulations."""
