@@ -32,7 +32,7 @@ DRIVE = (
     "40 ms, nothing fed forward. Or a file with settings of drive and feedback."
 )
 TORQUES = "urdf, stall or continuous: published limits differ; joints without motor data have the file's."
-FEEDBACK = "none, in open loop; balance: footholds, times of steps and torques of the whole body by the measured state (extra sim)."
+FEEDBACK = "none, in open loop; balance: footholds, times of steps and torques by the measured state (extra sim)."
 SLOPE = "Rise of the floor forward and to the left, added to the slope of a walk planned for one; each below 45."
 LIVE = "Show it in MuJoCo's viewer in real time; arrow keys push the robot forward, backward, to the left and to the right."
 PUSH = "Impulse on the torso, forward and to the left [N s], and its begin [s] (default: in the middle)."
