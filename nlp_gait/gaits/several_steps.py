@@ -37,7 +37,9 @@ def join_steps(steps: Sequence[Signals], robot: Robot, places: Array) -> Signals
     images: dict[int, Signals] = {}
     begin = 0.0
     for k, step in enumerate(steps):
-        side = step if k % 2 == 0 else images.setdefault(id(step), mirror(step, robot))
+        if k % 2 and id(step) not in images:
+            images[id(step)] = mirror(step, robot)
+        side = images[id(step)] if k % 2 else step
         for name, values in _move(side, places[k, :3], places[k, 3], begin).items():
             arrays[name].append(values if k == 0 else values[1:])
         begin += float(step.arrays["t"][-1])

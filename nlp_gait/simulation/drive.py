@@ -33,8 +33,8 @@ class Corrector(Protocol):
     def find_plan_time(self, time_s: float) -> float:
         """Return the time of the plan that the robot follows at a time of the simulation [s]."""
 
-    def correct(self, command: Array, data: Any) -> Array:
-        """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
+    def correct(self, command: Array, data: Any, step: int) -> tuple[Array, int]:
+        """Return the set-points (J,) [rad] instead of a planned one at a step of the engine, and for how many steps."""
 
 
 class Feedback(Protocol):
@@ -111,11 +111,11 @@ class Drive:
             return shifted
         return shifted + tau / np.array([self.stiffness(joint) for joint in joints])
 
-    def make_corrector(self, plan: Plan, model: Any) -> Corrector | None:
-        """Return what corrects the set-points of one simulation, None in open loop; ``model`` is the nominal one."""
+    def make_corrector(self, plan: Plan, make_model: Callable[[], Any]) -> Corrector | None:
+        """Return what corrects the set-points of one simulation, None in open loop; feedback knows the nominal model."""
         if self.controller is not None and self.controller.gravity_compensation > 0.0:
-            return GravityCompensation(self.controller, plan, model)
-        return None if self.feedback is None else self.feedback.make_corrector(plan, self, model)
+            return GravityCompensation(self.controller, plan, make_model())
+        return None if self.feedback is None else self.feedback.make_corrector(plan, self, make_model())
 
     def torque_limit(self, joint: Joint) -> float:
         """Return the torque limit of a joint [Nm]; the paper's controller has none."""

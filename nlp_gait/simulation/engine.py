@@ -68,26 +68,12 @@ def place_root(positions: Array, plan: Plan, place: Array, attitude: Array) -> N
 
 def measure_loads(data: Any, addresses: Addresses) -> Array:
     """Return the normal forces on both feet (2,), from all contacts with the ground [N]."""
-    feet, forces, _ = _list_contacts(data, addresses)
-    return np.array([forces[feet == i].sum() for i in range(len(SIDES))])
-
-
-def measure_pressure(data: Any, addresses: Addresses) -> tuple[Array, Array]:
-    """Return the normal forces on both feet (2,) [N] and the centre of pressure (2,) [m], from all contacts with the ground."""
-    _, forces, places = _list_contacts(data, addresses)
-    total = forces.sum()
-    centre = forces @ places / total if total > LEAST_LOAD else np.full(2, np.nan)
-    return measure_loads(data, addresses), centre
-
-
-def _list_contacts(data: Any, addresses: Addresses) -> tuple[Array, Array, Array]:
-    """Return the foot's number, the normal force [N] and the place (2,) [m] of each contact."""
     contact = data.contact
     active = contact.efc_address >= 0
     forces = data.efc_force[contact.efc_address[active]]  # the first row of an elliptic contact is along its normal
     # The ground's geometries come first
     feet = addresses.foot_of_body[data.model.geom_bodyid[contact.geom[active].max(axis=1)]]
-    return feet, forces, contact.pos[active, :2]
+    return np.array([forces[feet == i].sum() for i in range(len(SIDES))])
 
 
 # Between two commands of a controller: NAO's has cycles of 10 ms, the engine steps of 0.5 ms.

@@ -51,9 +51,9 @@ class GravityCompensation:
         """Return the time of the plan at a time of the simulation: the same [s]."""
         return time_s
 
-    def correct(self, command: Array, data: Any) -> Array:
-        """Return the set-points (J,) [rad] with those of gravity added."""
-        return command + self._controller.gravity_compensation * self.hold(data) / self._controller.kp
+    def correct(self, command: Array, data: Any, step: int) -> tuple[Array, int]:
+        """Return the set-points (J,) [rad] with those of gravity added, for one step of the engine."""
+        return command + self._controller.gravity_compensation * self.hold(data) / self._controller.kp, 1
 
     def hold(self, data: Any) -> Array:
         """Return the joint torques (J,) that hold the measured posture over the foremost foot on the ground [Nm]."""

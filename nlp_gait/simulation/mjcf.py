@@ -1,6 +1,6 @@
 """Robots and their world in MJCF, MuJoCo's model format; needs no MuJoCo."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from typing import Literal
@@ -50,7 +50,12 @@ TILE, TILE_MARGIN = 0.15, 0.5  # side of a tile, and ground around the planned s
 
 
 def make_plan_model(
-    plan: Plan, drive: Drive, sole: str = "rectangle", friction: float = FRICTION, bumps: Bumps | None = None
+    plan: Plan,
+    drive: Drive,
+    sole: str = "rectangle",
+    friction: float = FRICTION,
+    bumps: Bumps | None = None,
+    sensors: Iterable[Xml.Element] = (),
 ) -> str:
     """Return the model of a plan's robot with position drives on its ground, which all shapes can touch."""
     robot, shapes = plan.robot, make_plan_shapes(plan, sole)
@@ -89,6 +94,8 @@ def make_plan_model(
             actuators, "position", name=name, joint=name, forcerange=_format_numbers(-limit, limit)
         )
         actuator.attrib |= {"kp": _format_numbers(drive.stiffness(joint)), "kv": _format_numbers(drive.damping(joint))}
+    if elements := list(sensors):
+        Xml.SubElement(root, "sensor").extend(elements)
     Xml.indent(root)
     return Xml.tostring(root, encoding="unicode") + "\n"
 

@@ -10,10 +10,12 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Columns, Signals, make_vector_columns
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.engine import Addresses, check_range, load_mujoco, measure_pressure, place_root
+from nlp_gait.simulation.engine import Addresses, check_range, load_mujoco, place_root
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, Bumps, make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
+from nlp_gait.simulation.sensors import list_sensors, read_sensors
 
+CHUNK = 200  # steps of the engine without a look at the robot
 LONGEST_WALK = 3  # simulated times the planned duration, where feedback delays the plan
 SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot that has lost its balance falls within it
 FALLEN_TILT = math.radians(45.0)
@@ -25,6 +27,7 @@ COLUMNS = {
     "heading": Columns(unit="rad"),
     "feet": Columns(unit="m", labels=SIDES),
     "loads": Columns(unit="N", labels=SIDES),
+    "risers": Columns(unit="N", labels=SIDES),
     "pressure": make_vector_columns("m", "xy"),
 }
 
@@ -90,6 +93,7 @@ class Simulation:
     heading: Array  #: (T,) angle of the torso's forward axis about the floor's normal, positive to the left [rad]
     feet: Array  #: (T, 2, 3) soles under the ankles, left and right [m]
     loads: Array  #: (T, 2) force of the floor on the left and right foot, along its normal [N]
+    risers: Array  #: (T, 2) of these, forces of risers and other steep faces [N]
     pressure: Array  #: (T, 2) centre of pressure of both feet [m]; NaN in flight
     fell_at_s: float | None  #: None if the robot stayed up
     stepped_at_s: float | None = None  #: begin of a step that balance feedback took at rest
@@ -127,8 +131,8 @@ class Run:
         self._commands = drive.set_points(plan.at, times, [plan.robot.joint(name) for name in plan.joints])
         heights, self._axes = plan.at("hip", times)[:, 2], plan.torso_axis(times)
         self._least_heights = heights - (1.0 - FALLEN_HEIGHT) * heights[0]
-        self._corrector = drive.make_corrector(plan, prepare(plan, Conditions(), drive, sole)[0])
-        self._rows: list[tuple[Any, ...]] = []
+        self._corrector = drive.make_corrector(plan, lambda: prepare(plan, Conditions(), drive, sole)[0])
+        self._parts: list[dict[str, Array]] = []
         self._step = 0
         self.fell_at_s: float | None = None
 
@@ -139,37 +143,74 @@ class Run:
 
     def advance(self, until_s: float = math.inf) -> bool:
         """Simulate until a time, the end of the walk or a fall; return whether the robot is still up and on its way."""
-        while self.time_s < until_s:
-            time, corrector = self.time_s, self._corrector
-            plan_time = time if corrector is None else corrector.find_plan_time(time)
-            k = round(plan_time / TIME_STEP)
-            if (
-                self.fell_at_s is not None
-                or k >= len(self._commands)
-                or self._step >= LONGEST_WALK * len(self._commands)
-            ):
+        while self.time_s < until_s and self.fell_at_s is None:
+            left = LONGEST_WALK * len(self._commands) - self._step
+            steps = math.ceil(min(CHUNK, left, (until_s - self.time_s) / TIME_STEP - 1e-6))
+            commands, plan_times = self._command(steps)
+            if not len(commands):
                 return False
-            command = self._commands[k] if corrector is None else corrector.correct(self._commands[k], self.data)
-            self._advance_engine(command, k, time, plan_time)
+            self._advance_engine(commands, plan_times)
         return self.fell_at_s is None
 
-    def _advance_engine(self, command: Array, k: int, time: float, plan_time: float) -> None:
-        data, addresses, push = self.data, self._addresses, self._conditions.push
-        data.ctrl[addresses.actuators] = command
+    def _command(self, steps: int) -> tuple[Array, Array]:
+        """Return set-points (T, J) of at most so many next steps and their times of the plan (T,); none after the end."""
+        corrector, planned = self._corrector, self._commands
+        if corrector is None:
+            commands = planned[self._step : self._step + steps]
+            return commands, np.array(TIME_STEP * np.arange(self._step, self._step + len(commands)))
+        plan_times = [corrector.find_plan_time(self.time_s)]
+        if steps < 1 or (k := round(plan_times[0] / TIME_STEP)) >= len(planned):
+            return planned[:0], np.zeros(0)
+        command, valid = corrector.correct(planned[k], self.data, self._step)
+        times = self.time_s + TIME_STEP * np.arange(1, min(steps, valid))
+        plan_times += [
+            time for t in times.tolist() if round((time := corrector.find_plan_time(t)) / TIME_STEP) < len(planned)
+        ]
+        return np.tile(command, (len(plan_times), 1)), np.array(plan_times)
+
+    def _advance_engine(self, commands: Array, plan_times: Array) -> None:
+        from mujoco import rollout
+
+        model, data, addresses, count = self.model, self.data, self._addresses, len(commands)
+        kinds, spec = self._engine.mjtState, self._engine.mjtState.mjSTATE_FULLPHYSICS
+        controls, times = np.zeros((count, model.nu)), TIME_STEP * np.arange(self._step, self._step + count)
+        controls[:, addresses.actuators] = commands
+        kind, push = kinds.mjSTATE_CTRL, self._conditions.push
         if push is not None:
             start = self.plan.duration_s / 2 if push.start_s is None else push.start_s
-            data.xfrc_applied[addresses.torso, :2] = push.force(time - start)
-        state, qd = data.qpos.copy(), data.qvel[addresses.rates]
-        self._engine.mj_step(self.model, data)  # leaves positions, forces and contacts of the instant at which it began
-        torso, axes = data.xpos[addresses.torso].copy(), data.xmat[addresses.torso]
-        upright, heading = float(axes[2::3] @ self._axes[k]), math.atan2(axes[3], axes[0])
-        feet, torque = data.site_xpos[addresses.soles], data.actuator_force[addresses.actuators]
-        measured = torso, upright, heading, feet, *measure_pressure(data, addresses)
-        self._rows.append((time, np.array(command), state, qd, torque, plan_time, *measured))
-        diverged = not np.isfinite(data.qvel).all()
-        if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < self._least_heights[k]:
-            self.fell_at_s = time
-        self._step += 1
+            forces = np.zeros((count, model.nbody, 6))
+            forces[:, addresses.torso, :2] = [push.force(time - start) for time in times.tolist()]
+            controls = np.hstack([controls, forces.reshape(count, -1)])
+            kind |= kinds.mjSTATE_XFRC_APPLIED
+        state, warm = np.empty(self._engine.mj_stateSize(model, spec)), data.qacc_warmstart.copy()
+        self._engine.mj_getState(model, data, state, spec)
+        states, sensors = rollout.rollout(
+            model, data, state[None], controls[None], control_spec=int(kind), initial_warmstart=warm[None]
+        )
+        # A step leaves positions, forces and contacts of the instant at which it began
+        before = np.concatenate([state[None], states[0, :-1]])
+        readings = read_sensors(self.plan, sensors[0])
+        k = np.rint(plan_times / TIME_STEP).astype(int)
+        upright = np.einsum("ti,ti->t", readings.upward, self._axes[k])
+        diverged = ~np.isfinite(states[0]).all(axis=1) | (np.abs(states[0, :, 0] - times - TIME_STEP) > TIME_STEP / 2)
+        fallen = diverged | (upright < math.cos(FALLEN_TILT)) | (readings.torso[:, 2] < self._least_heights[k])
+        if fallen.any():
+            count = int(fallen.argmax()) + 1
+            self.fell_at_s = float(times[count - 1])
+        positions, velocities = np.split(before[:, 1 : 1 + model.nq + model.nv], [model.nq], axis=1)
+        part = {
+            "t": times,
+            "plan_t": plan_times,
+            "states": positions,
+            "q": positions[:, addresses.angles],
+            "qd": velocities[:, addresses.rates],
+            "set_points": commands,
+            "tilt": np.arccos(np.clip(upright, -1.0, 1.0)),
+            "heading": np.arctan2(readings.forward[:, 1], readings.forward[:, 0]),
+            **{name: getattr(readings, name) for name in ("torque", "torso", "feet", "loads", "risers", "pressure")},
+        }
+        self._parts.append({name: values[:count] for name, values in part.items()})
+        self._step += count
 
     def push(self, push: Push) -> None:
         """Push the robot from now on by this push instead of an earlier one."""
@@ -178,7 +219,7 @@ class Run:
     def fork(self, push: Push) -> "Run":
         """Return a copy that is pushed; its trace begins here."""
         other = copy.copy(self)
-        other.data, other._rows = copy.copy(self.data), []
+        other.data, other._parts = copy.copy(self.data), []
         other._corrector = None if self._corrector is None else self._corrector.fork()
         other.push(push)
         return other
@@ -186,10 +227,7 @@ class Run:
     def finish(self) -> Simulation:
         """Simulate to the end and return the measurements."""
         self.advance()
-        columns = (np.array(column, dtype=float) for column in zip(*self._rows, strict=True))
-        measured = dict(zip(("t", "set_points", "states", "qd", "torque", *COLUMNS), columns, strict=True))
-        measured["q"] = measured["states"][:, self._addresses.angles]
-        measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows have its cosine
+        measured = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
         stepped_at_s = None if self._corrector is None else self._corrector.stepped_at_s
         return Simulation(**measured, fell_at_s=self.fell_at_s, stepped_at_s=stepped_at_s)
 
@@ -207,7 +245,8 @@ def simulate_plan(
 def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:
     """Return the engine's model and data, with the robot in its planned state at time zero."""
     engine = load_mujoco()
-    model = engine.MjModel.from_xml_string(make_plan_model(plan, drive, sole, conditions.friction, conditions.bumps))
+    xml = make_plan_model(plan, drive, sole, conditions.friction, conditions.bumps, list_sensors(plan))
+    model = engine.MjModel.from_xml_string(xml)
     model.body_mass *= conditions.mass_factor
     model.body_inertia *= conditions.mass_factor
     model.actuator_gainprm[:, 0] *= conditions.stiffness_factor

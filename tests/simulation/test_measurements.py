@@ -75,6 +75,7 @@ def traced(**changed):
         "heading": 0.0 * t,
         "feet": np.stack([left, right], axis=1),
         "loads": loads,
+        "risers": np.zeros((len(t), 2)),
         "pressure": still(t, ZMP + (0.003, 0.004)),
         "fell_at_s": None,
     }

@@ -285,19 +285,19 @@ class WholeBodyBalance:
         """Return the time of the plan that the robot has reached, and the time since the plan's end [s]."""
         return (self.clock.time_s if self.stepped_at_s is None else self._plan_s) + self.clock.ended_s
 
-    def correct(self, command: Array, data: Any) -> Array:
-        """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
-        state = self._sampler.sample(lambda: self._measure(data))
+    def correct(self, command: Array, data: Any, step: int) -> tuple[Array, int]:
+        """Return the set-points (J,) [rad] instead of the planned ones, and for how many steps of the engine."""
+        state = self._sampler.sample(step, lambda: self._measure(data))
         if state is not None:
-            self._command = self._update(state)
-        return command if self._command is None else self._command
+            self._command = self._update(state, step)
+        return command if self._command is None else self._command, self._sampler.wait(step)
 
     def _measure(self, data: Any) -> RobotState:
         positions, noise = data.qpos.copy(), self._noise * self._sampler.random.standard_normal(self._noise.shape)
         self._engine.mj_integratePos(self._model, positions, noise[0], 1.0)
         return RobotState(positions, data.qvel + noise[1], measure_loads(data, self._addresses))
 
-    def _update(self, state: RobotState) -> Array:
+    def _update(self, state: RobotState, step: int) -> Array:
         """Return the set-points (J,) [rad] that give the torques of balance, damped towards planned rates."""
         s, data, engine, joints = self._settings, self._data, self._engine, self._addresses
         data.qpos[:], data.qvel[:] = state.positions, state.velocities
@@ -309,7 +309,7 @@ class WholeBodyBalance:
         self.clock.advance(state.loads / weight, feet)
         dcm = data.subtree_com[0, :2] + data.subtree_linvel[0, :2] / self.clock.reference.rate
         if self.clock.after is None and self.clock.phase.swing is None:
-            self._step_if_needed(dcm, feet)
+            self._step_if_needed(dcm, feet, step * float(self._model.opt.timestep))
         solution = self._qp.solve(data, self._collect_targets(data, dcm, feet, weight))
         q, qd = data.qpos[joints.angles], data.qvel[joints.rates]
         if solution is None:
@@ -321,7 +321,7 @@ class WholeBodyBalance:
         held, held_rate = q + hold * (planned - q), soon + s.damp * (self.clock.rate * rate - soon)
         return np.asarray(held + (solution.torques + self._damping * held_rate) / self._stiffness)
 
-    def _step_if_needed(self, dcm: Array, feet: Array) -> None:
+    def _step_if_needed(self, dcm: Array, feet: Array, time_s: float) -> None:
         """Begin a step from rest where the divergent component has left the soles (2, 3), and a foothold brings it back."""
         s, reference = self._settings, self.clock.reference
         nearest = clip_to_soles(dcm, feet[:, :2], reference.sample("yaw", self.clock.time_s), reference.soles)
@@ -330,7 +330,7 @@ class WholeBodyBalance:
             errors = [clock.predict_error(dcm) for clock in clocks]
             if min(errors) < s.step_error * reference.height:
                 self.clock = clocks[errors.index(min(errors))]
-                self.stepped_at_s = self.stepped_at_s or self._sampler.time_s
+                self.stepped_at_s = self.stepped_at_s or time_s
 
     def _collect_targets(self, data: Any, dcm: Array, feet: Array, weight: float) -> Targets:
         """Return the accelerations and loads that lead back to the plan."""

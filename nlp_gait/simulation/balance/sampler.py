@@ -16,22 +16,20 @@ class Sampler(Generic[V]):
     def __init__(self, period_s: float, delay_s: float, seed: int, step_s: float) -> None:
         """Start with the simulation, whose time step is ``step_s`` [s]."""
         self.random = np.random.default_rng(seed)
-        self._step_s, self._every, self._late = step_s, max(1, round(period_s / step_s)), round(delay_s / step_s)
+        self._every, self._late = max(1, round(period_s / step_s)), round(delay_s / step_s)
         self._waiting: deque[tuple[int, V]] = deque()
-        self._steps = 0
 
-    @property
-    def time_s(self) -> float:
-        """Simulated time [s]."""
-        return self._steps * self._step_s
-
-    def sample(self, measure: Callable[[], V]) -> V | None:
-        """Return the measurement that arrives at this time step, if any; call it once in every step."""
-        if self._steps % self._every == 0:
-            self._waiting.append((self._steps + self._late, measure()))
-        arrived = bool(self._waiting) and self._waiting[0][0] <= self._steps
-        self._steps += 1
+    def sample(self, step: int, measure: Callable[[], V]) -> V | None:
+        """Return the measurement that arrives at a step of the engine, if any; call it once in each that ``wait`` names."""
+        if step % self._every == 0:
+            self._waiting.append((step + self._late, measure()))
+        arrived = bool(self._waiting) and self._waiting[0][0] <= step
         return self._waiting.popleft()[1] if arrived else None
+
+    def wait(self, step: int) -> int:
+        """Return the number of steps until the next measurement or arrival after a step."""
+        arrival = self._waiting[0][0] if self._waiting else step + self._every
+        return min(arrival - step, self._every - step % self._every)
 
     def fork(self) -> Self:
         """Return a copy for a simulation that begins in the middle of this one."""
