@@ -104,7 +104,8 @@ def test_gravity_is_compensated_by_the_torques_that_hold_the_posture_over_the_fo
     expected = compute_joint_torques(held, np.zeros(1))[0]
     joints = [i for i, name in enumerate(plan.joints) if name != "LToe"]  # which carries no weight behind the foot
     np.testing.assert_allclose(compensation.hold(data)[joints], expected[joints], atol=1e-6)
-    shift = compensation.correct(np.zeros(len(plan.joints)), data)
+    shift, steps = compensation.correct(np.zeros(len(plan.joints)), data, 0)
+    assert steps == 1
     np.testing.assert_allclose(shift[joints], 0.5 * expected[joints] / 100.0, atol=1e-8)
 
 
