@@ -6,7 +6,7 @@ exact functions to search algorithms, and ``compile_function`` compiles any CasA
 
 from __future__ import annotations
 
-from nlp_gait.providers import FILE_HASHES, FUNCTIONS, LIMITS, PROBLEMS, import_object
+from nlp_gait.providers import import_object
 
 # In place of typing's, whose import takes longer than all that Ctrl-C waits for; type checkers know the name.
 TYPE_CHECKING = False
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
     from nlp_gait.errors import GaitError as GaitError
     from nlp_gait.formulation import GaitProblem as GaitProblem
     from nlp_gait.formulation import list_problems as list_problems
-    from nlp_gait.formulation import load as load
     from nlp_gait.formulation.solution import Solution as Solution
+    from nlp_gait.loading import load as load
 
 # Imported on first use: a search needs no NLP solver, a solve no kernel, and the command line starts quickly.
 _PUBLIC = {
     "nlp_gait.errors": "GaitError",
-    "nlp_gait.formulation": "GaitProblem list_problems load",
+    "nlp_gait.formulation": "GaitProblem list_problems",
     "nlp_gait.formulation.solution": "Solution",
     "nlp_gait.backends.kernel.compiled": "CompiledObjective compile_objective",
     "nlp_gait.backends.kernel.compiled_function": "CompiledFunction compile_function",
@@ -43,34 +43,10 @@ _PUBLIC = {
     "nlp_gait.backends.solve": "solve",
     "nlp_gait.backends.solvers.ipopt": "IpoptSettings",
     "nlp_gait.backends.solvers.registry": "make_solver",
-    "compare.report.compared_study": "compare",
+    "nlp_gait.loading": "load",
 }
 _PLACES = {name: f"{module}:{name}" for module, names in _PUBLIC.items() for name in names.split()}
-__all__ = sorted(_PLACES)
-# What lower packages use of higher ones, by name.
-PROBLEMS |= {
-    "nao-ssp": "nlp_gait.gaits.nao.problems:nao_ssp",
-    "nao-dsp": "nlp_gait.gaits.nao.problems:nao_dsp",
-    "nao-walk": "nlp_gait.gaits.nao.walking:nao_walk",
-    "nao-cycle": "nlp_gait.gaits.nao.walking:nao_cycle",
-    "humanoid-ssp": "nlp_gait.gaits.humanoid.problems:humanoid_ssp",
-    "humanoid-dsp": "nlp_gait.gaits.humanoid.problems:humanoid_dsp",
-    "humanoid-cycle": "nlp_gait.gaits.humanoid.problems:humanoid_cycle",
-    "humanoid-walk": "nlp_gait.gaits.humanoid.problems:humanoid_walk",
-    "walk12": "nlp_gait.gaits.walk12.walk12_problem:walk12",
-    "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
-    "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",
-    "stairs-climb": "nlp_gait.gaits.stairs.climb:stairs_climb",
-    "gaitbench": "nlp_gait.gaitbench.suite_problem:gaitbench",
-}
-LIMITS |= {name: f"nlp_gait.gaits.biped.limits:{name}" for name in ("FrictionCone", "FootClearance")}
-FILE_HASHES["limits"] = "nlp_gait.formulation.added_limits:hash_limits"
-FILE_HASHES["robot"] = "nlp_gait.robots.loading:hash_robot"
-FUNCTIONS["resolve_instance"] = "nlp_gait.gaitbench.generated:resolve_instance"
-FUNCTIONS["load_generated"] = "nlp_gait.gaitbench.instance:load_generated"
-FUNCTIONS["tabulate_sensitivities"] = "nlp_gait.backends.optima.sensitivities:tabulate_sensitivities"
-FUNCTIONS["plot_gait"] = "compare.drawing.gait_figure:plot_gait"
-FUNCTIONS["animate_gait"] = "compare.report.interactive:animate_gait"
+__all__ = sorted([*_PLACES, "compare"])
 
 
 def __getattr__(name: str) -> Any:
@@ -79,6 +55,10 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("nlp-gait")
+    if name == "compare":
+        from compare.report.compared_study import compare
+
+        return compare
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return import_object(_PLACES[name])

@@ -1,7 +1,6 @@
-"""Objects that higher packages provide to lower ones by name, as ``"module:object"``, imported on first use.
+"""Problems and limits of this package by name, each with the place of its definition, which is imported on first use.
 
-``nlp_gait/__init__.py``, which may know every package, fills the tables; no other module names a higher one. The command line
-imports this module before everything else, so it imports nothing that takes time.
+The command line imports this module before everything else, so it imports nothing that takes time.
 """
 
 from __future__ import annotations
@@ -10,11 +9,22 @@ TYPE_CHECKING = False  # in place of typing's, as in ``nlp_gait/__init__.py``
 if TYPE_CHECKING:
     from typing import Any
 
-PROBLEMS: dict[str, str] = {}  # makers of problems, by the problem's name
-LIMITS: dict[str, str] = {}  # classes of limits that a user may add to a gait, by name
-# By option of problems that may name a file: hash of its content, "" for another value.
-FILE_HASHES: dict[str, str] = {}
-FUNCTIONS: dict[str, str] = {}  # by their task, such as ``plot_gait``
+PROBLEMS = {
+    "nao-ssp": "nlp_gait.gaits.nao.problems:nao_ssp",
+    "nao-dsp": "nlp_gait.gaits.nao.problems:nao_dsp",
+    "nao-walk": "nlp_gait.gaits.nao.walking:nao_walk",
+    "nao-cycle": "nlp_gait.gaits.nao.walking:nao_cycle",
+    "humanoid-ssp": "nlp_gait.gaits.humanoid.problems:humanoid_ssp",
+    "humanoid-dsp": "nlp_gait.gaits.humanoid.problems:humanoid_dsp",
+    "humanoid-cycle": "nlp_gait.gaits.humanoid.problems:humanoid_cycle",
+    "humanoid-walk": "nlp_gait.gaits.humanoid.problems:humanoid_walk",
+    "walk12": "nlp_gait.gaits.walk12.walk12_problem:walk12",
+    "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
+    "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",
+    "stairs-climb": "nlp_gait.gaits.stairs.climb:stairs_climb",
+    "gaitbench": "nlp_gait.gaitbench.suite_problem:gaitbench",
+}
+LIMITS = {name: f"nlp_gait.gaits.biped.limits:{name}" for name in ("FrictionCone", "FootClearance")}
 
 
 def import_object(place: str) -> Any:

@@ -13,7 +13,7 @@ from nlp_gait.decoding import decode
 from nlp_gait.formulation import Objective, load
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.gaitbench.facts import SIX_DIGITS
-from nlp_gait.providers import FUNCTIONS, PROBLEMS, import_object
+from nlp_gait.providers import PROBLEMS
 
 # Relative difference of an objective that is computed on another machine or by other compiled code.
 SAME_VALUE = 1e-9
@@ -95,7 +95,9 @@ def _identify(description: str) -> Mapping[str, Any]:
 
 def _find_generated(id: str, problem: Mapping[str, Any]) -> Reference | None:
     """Return the best known point of a generated instance, which may take some seconds if this machine has not found it yet."""
-    instance = import_object(FUNCTIONS["load_generated"])(id)
+    from nlp_gait.gaitbench.instance import load_generated
+
+    instance = load_generated(id)
     if instance is None or describe_difference(problem, identify_problem(instance.gait_problem)):
         return None
     sign = instance.gait_problem.objective.sign

@@ -24,7 +24,8 @@ from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import replace_nan
 from nlp_gait.formulation import GaitProblem, Objective
-from nlp_gait.formulation.registry import check_options, find_maker, hash_files, load, resolve_name
+from nlp_gait.formulation.registry import check_options, find_maker, hash_files, load
+from nlp_gait.gaitbench.generated import resolve_name
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import (
     check_reference,

@@ -14,12 +14,12 @@ from casadi import MX, Function, vertcat
 
 from nlp_gait.errors import InputError, check_name, describe_type, format_value, unknown
 from nlp_gait.files import check_path
-from nlp_gait.formulation.added_limits import AddedLimits, resolve_limits
+from nlp_gait.formulation.added_limits import AddedLimits, hash_limits, resolve_limits
 from nlp_gait.formulation.assembly import Assembly, Parameter, Variable
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import is_number
-from nlp_gait.providers import FILE_HASHES, FUNCTIONS, PROBLEMS, import_object
+from nlp_gait.providers import PROBLEMS, import_object
 from nlp_gait.symbolic.nonsmooth import Exact
 
 # More intervals and samples than this are of no use, and such a problem takes too long to build.
@@ -174,8 +174,12 @@ def resolve_stored(name: str, options: Mapping[str, Any], owner: str) -> tuple[s
 
 def hash_files(options: Mapping[str, Any]) -> dict[str, str]:
     """Return the hashes of the files that options of a problem name, by option."""
-    names = FILE_HASHES.keys() & options.keys()
-    return {name: digest for name in names if (digest := import_object(FILE_HASHES[name])(options[name]))}
+    hashes = {"limits": hash_limits(str(options["limits"]))} if options.get("limits") else {}
+    if "robot" in options:
+        from nlp_gait.robots.loading import hash_robot
+
+        hashes["robot"] = hash_robot(options["robot"])
+    return {name: digest for name, digest in hashes.items() if digest}
 
 
 def _to_python(value: Any) -> Any:
@@ -190,13 +194,11 @@ def _list_choices(make: Maker) -> dict[str, tuple[str, ...]]:
 def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
     """Return a problem by name, see ``find_maker``, built with the given options; the others keep their defaults.
 
-    An instance of GaitBench is a problem, too: ``load("ssp-v5")``, ``load("gb2:ssp:3")``. A problem of this package with equal
-    options is made once, unless they name a file. Raises UnknownNameError, and InputError for a value that the option does not
-    allow, or user code that fails.
+    A problem of this package with equal options is made once, unless they name a file. Raises UnknownNameError, and InputError
+    for a value that the option does not allow, or user code that fails.
     """
     check_name("problem", name)
-    name, instance = resolve_name(name)
-    make, options = find_maker(name), {**instance, **options}
+    make = find_maker(name)
     if name not in PROBLEMS:
         return make(**options)
     check_options(make, options)  # first, for what is not hashable
@@ -206,14 +208,6 @@ def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
 @functools.lru_cache(maxsize=64, typed=True)
 def _make_once(make: Maker, /, **options: Any) -> GaitProblem:
     return make(**options)
-
-
-def resolve_name(name: str) -> tuple[str, dict[str, str]]:
-    """Return a name for ``find_maker`` and the options that it stands for: those of an instance, none for other names."""
-    if name in PROBLEMS:
-        return name, {}
-    options = import_object(FUNCTIONS["resolve_instance"])(name)
-    return ("gaitbench", options) if options else (name, {})
 
 
 def check_mathematics(problem: GaitProblem) -> None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.notebook import format_html_table
-from nlp_gait.providers import FUNCTIONS, import_object
 
 if TYPE_CHECKING:
     from nlp_gait.formulation.gait_problem import GaitProblem
@@ -201,11 +200,15 @@ class Solution:
 
     def plot(self) -> Any:
         """Plot the gait with Matplotlib: stick figures, power and balance margin; raises as ``signals``."""
-        return import_object(FUNCTIONS["plot_gait"])(self.problem, self.x, self.best.solver)
+        from compare.drawing.gait_figure import plot_gait
+
+        return plot_gait(self.problem, self.x, self.best.solver)
 
     def animate(self) -> Any:
         """Return a page that plays the gait in 3-D, with power and margin, for notebooks; ``write`` saves it. See ``plot``."""
-        return import_object(FUNCTIONS["animate_gait"])(self.problem, self.x, self.best.solver)
+        from compare.report.interactive import animate_gait
+
+        return animate_gait(self.problem, self.x, self.best.solver)
 
     def sensitivity(self) -> Any:
         """Return a table of the derivatives of x and the objective with respect to all parameters.
@@ -213,7 +216,9 @@ class Solution:
         It has ``value(quantity, parameter)`` in the quantity's unit per unit of the parameter, ``write_csv(path)``, and
         ``reach``, how far each parameter may change. Raises InputError without multipliers, or if x is not an isolated optimum.
         """
-        return import_object(FUNCTIONS["tabulate_sensitivities"])(self)
+        from nlp_gait.backends.optima.sensitivities import tabulate_sensitivities
+
+        return tabulate_sensitivities(self)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain dictionaries, lists and numbers, with the schema version of results."""

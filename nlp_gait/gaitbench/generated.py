@@ -115,11 +115,16 @@ def is_generated(id: str) -> bool:
     return id.startswith(f"{PREFIX}:")
 
 
-def resolve_instance(name: str) -> dict[str, str]:
-    """Return the option of the problem ``gaitbench`` for the id of an instance, {} for another name; raises as ``define``."""
+def resolve_name(name: str) -> tuple[str, dict[str, str]]:
+    """Return name and options of the problem that an instance's id stands for; another name as it is, without options.
+
+    Raises as ``define``.
+    """
     if is_generated(name):
         parse_id(name)
-    return {"instance": name} if is_generated(name) or name in BY_ID else {}
+    elif name in PROBLEMS or name not in BY_ID:
+        return name, {}
+    return "gaitbench", {"instance": name}
 
 
 def define(id: str) -> Definition:
