@@ -67,6 +67,7 @@ class Start:
     initial: Array
     evaluations: int  #: budget of the run, a hint for algorithms that plan ahead
     rng: np.random.Generator  #: the only source of randomness of the search
+    time_limit_s: float | None = None  #: limit of the run [s]; None for none
     names: tuple[str, ...] = ()  #: the n names of the variables
 
 
@@ -178,12 +179,18 @@ class Algorithm(Protocol):
         """Begin a run with bounds, starting points, budget and generator."""
 
 
-# Evaluates points (P, n) as a generation; raises `Ended` once the run is over.
-Evaluate = Callable[[Array], tuple[Array, Array, Rule]]
+class Ended(SystemExit):
+    """End of a run; not an `Exception`, so that no optimiser treats it as a failed evaluation, and silent in a thread."""
 
 
-class Ended(BaseException):
-    """End of a run; not an `Exception`, so that no optimiser treats it as a failed evaluation."""
+class Evaluate(Protocol):
+    """Evaluates points for a search that calls the objective, from any thread; raises `Ended` once the run is over."""
+
+    #: Of one point (n,) to its objective and violation, faster; None if the run's rule or objective does not allow it
+    point: Callable[[Array], tuple[float, float]] | None
+
+    def __call__(self, X: Array, /) -> tuple[Array, Array, Rule]:
+        """Evaluate points (P, n) as a generation."""
 
 
 class CallingSearch(ABC):

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field
 from functools import cache
 from numbers import Integral
+from threading import Lock
 from time import perf_counter
 
 import numpy as np
@@ -94,21 +95,38 @@ class Evaluator:
         answer = self._objective(shown)
         self.objective_time_s += perf_counter() - before
         f, violation, failed = mark_failed(*_read_answer(answer, len(X)))
-
-        self.evaluations += len(X)
-        self.failed += int(np.count_nonzero(failed))
         leader = interface.FEASIBILITY.best(f, violation)
         best = (float(violation[leader]), float(f[leader]))
-        self.stagnation += 1
-        if best < self.best or not self._history:
-            self.best, self.best_x, self.stagnation = best, X[leader].copy(), 0
-        self.generations += 1
-        if self._thinned and self.stagnation > 1:
-            self._history.pop()
-        self._history.append((self.evaluations, self.best[1], self.best[0], self.elapsed_s))
+        self._record(len(X), int(np.count_nonzero(failed)), X[leader], best, self.elapsed_s)
         if self._callback is not None:
             self._callback(shown, f, violation)
         return f, violation
+
+    def evaluate_point(self, x: Array) -> tuple[float, float]:
+        """Evaluate one point (n,) by the objective's function ``point``, and record it; infinite where it failed."""
+        before = perf_counter()
+        f, violation = self._objective.point(x)  # type: ignore[attr-defined]
+        now = perf_counter()
+        self.objective_time_s += now - before
+        failed = not (math.isfinite(f) and math.isfinite(violation))
+        if failed:
+            f = violation = math.inf
+        self._record(1, failed, x, (violation, f), now - self._started)
+        return f, violation
+
+    def _record(self, count: int, failed: int, x: Array, best: tuple[float, float], elapsed_s: float) -> None:
+        """Record a generation by its best point, and the time since the start."""
+        self.evaluations += count
+        self.failed += failed
+        self.generations += 1
+        self.stagnation += 1
+        if best < self.best or not self._history:
+            self.best, self.best_x, self.stagnation = best, x.copy(), 0
+        entry = (self.evaluations, self.best[1], self.best[0], elapsed_s)
+        if self._thinned and self.stagnation > 1:
+            self._history[-1] = entry
+        else:
+            self._history.append(entry)
 
     def history(self) -> interface.History:
         """Return the history so far as arrays."""
@@ -160,12 +178,17 @@ class EarlyStop:
 
     def list_reasons(self, record: Evaluator) -> list[str]:
         """Return the reasons to end a run now."""
-        reached = {
-            "target reached": self.target is not None and record.best[0] == 0.0 and record.best[1] <= self.target,
-            f"no better point in {self.stagnation} generations": record.stagnation >= (self.stagnation or np.inf),
-            "time limit reached": record.elapsed_s >= (self.time_limit_s or np.inf),
-        }
-        return [reason for reason, is_reached in reached.items() if is_reached]
+        reasons = []
+        if self.target is not None and record.best[0] == 0.0 and record.best[1] <= self.target:
+            reasons.append("target reached")
+        if self.stagnation is not None and record.stagnation >= self.stagnation:
+            reasons.append(f"no better point in {self.stagnation} generations")
+        if self.time_limit_s is not None and record.elapsed_s >= self.time_limit_s:
+            reasons.append("time limit reached")
+        return reasons
+
+
+NEVER = EarlyStop()
 
 
 @dataclass(kw_only=True)
@@ -178,21 +201,45 @@ class _Run:
     handling: ConstraintHandling
     stop: EarlyStop
     sequence: np.random.SeedSequence
+    point: Callable[[Array], tuple[float, float]] | None = None  # see ``Evaluate``
     reasons: list[str] = field(default_factory=list)
     initial_violation: Array | None = None
+    lock: AbstractContextManager[object] = field(default_factory=Lock)  # a function may call from several threads
 
-    def evaluate(self, points: Array) -> tuple[Array, Array, Rule]:
+    def __call__(self, points: Array) -> tuple[Array, Array, Rule]:
         """Evaluate the part of a generation that fits the budget; raise `Ended` once a limit is reached."""
-        if self.reasons:  # a function ignored the first `Ended`
-            raise Ended
-        f, violation = self.record(points[: self.evaluations - self.record.evaluations])
-        if self.initial_violation is None:
-            self.initial_violation = violation
-        used = ["evaluation budget used"] if self.record.evaluations >= self.evaluations else []
-        self.reasons = used + self.stop.list_reasons(self.record)
+        with self.lock:
+            self._check_end()  # a function ignored the first `Ended`
+            f, violation = self.record(points[: self.evaluations - self.record.evaluations])
+            if self.initial_violation is None:
+                self.initial_violation = violation
+            self._list_reasons()
+            self._check_end()
+            return f, violation, self.handling.rule(self.record.evaluations / self.evaluations, self.initial_violation)
+
+    def evaluate_point(self, x: Array) -> tuple[float, float]:
+        """Evaluate one point (n,), as ``__call__`` does."""
+        with self.lock:
+            self._check_end()
+            values = self.record.evaluate_point(x)
+            self._list_reasons()
+            self._check_end()
+            return values
+
+    def end(self, reason: str) -> list[str]:
+        """Let nothing be evaluated any more; return why the run ended."""
+        with self.lock:
+            self.reasons = self.reasons or [reason]
+        return self.reasons
+
+    def _list_reasons(self) -> None:
+        if self.record.evaluations >= self.evaluations or self.stop is not NEVER:
+            used = ["evaluation budget used"] if self.record.evaluations >= self.evaluations else []
+            self.reasons = used + self.stop.list_reasons(self.record)
+
+    def _check_end(self) -> None:
         if self.reasons:
             raise Ended
-        return f, violation, self.handling.rule(self.record.evaluations / self.evaluations, self.initial_violation)
 
     def conclude(self, reasons: list[str]) -> interface.Result:
         """Return the result of a run that ended for these reasons."""
@@ -253,19 +300,22 @@ def minimize(
         SearchError: An argument is not allowed, or the objective answers with wrong shapes.
         Interrupted: Ctrl-C after at least one generation; carries the partial result.
     """
-    handling, stop = Deb() if handling is None else handling, EarlyStop() if stop is None else stop
+    handling, stop = Deb() if handling is None else handling, NEVER if stop is None else stop
     if not isinstance(stop, EarlyStop):
         raise SearchError(f"stop must be made by EarlyStop(...), or None, got {abbreviate(stop)}")
     preparation.check_budget(algorithm, evaluations)
     preparation.check_helpers(handling, callback)
     sequence = preparation.seed_sequence(seed)
-    start = preparation.prepare_start(objective, algorithm.population, evaluations, sequence, initial)
+    limit_s = stop.time_limit_s
+    start = preparation.prepare_start(objective, algorithm.population, evaluations, sequence, initial, limit_s)
     search = algorithm.start(start)
     # A search that calls the objective evaluates point by point.
     record = Evaluator(objective, callback, thinned=isinstance(search, CallingSearch))
     run = _Run(
         record=record, algorithm=algorithm, evaluations=evaluations, handling=handling, stop=stop, sequence=sequence
     )
+    if callback is None and isinstance(handling, Deb) and callable(getattr(objective, "point", None)):
+        run.point = run.evaluate_point
     try:
         with limit_blas_threads(algorithm, objective), suppress(Ended):
             return run.conclude(_search(search, run, start))
@@ -273,19 +323,20 @@ def minimize(
     except KeyboardInterrupt as interrupt:
         if not record.generations:
             raise
+        run.end("interrupted")
         raise interface.Interrupted(run.conclude(["interrupted"])) from interrupt
 
 
 def _search(search: Search | CallingSearch, run: _Run, start: interface.Start) -> list[str]:
     """Run a search to its own end; return its reasons."""
     if isinstance(search, CallingSearch):
-        reason = search.run(run.evaluate)
+        reasons = run.end(search.run(run))
         if not run.record.generations:
-            raise SearchError("the function returned without any call of f")
-        return run.reasons or [reason]
+            raise SearchError(f"f was never called: {reasons[0]}")
+        return reasons
     preparation.check_search(search, run.algorithm)
     while True:
         X = preparation.check_points(search.ask(), start.lower, start.upper)
-        search.tell(X, *run.evaluate(X))
+        search.tell(X, *run(X))
         if reasons := preparation.check_reasons(search.stop()):
             return reasons

@@ -19,6 +19,7 @@ def prepare_start(
     evaluations: int,
     seed: np.random.SeedSequence,
     initial: ArrayLike | None = None,
+    time_limit_s: float | None = None,
 ) -> Start:
     """Return the inputs of an algorithm; raises SearchError for bounds or starting points (R, n) that are not allowed."""
     lower, upper = read_bounds(objective)
@@ -32,6 +33,7 @@ def prepare_start(
         initial=draw_starting_points(lower, upper, population, initial, first),
         evaluations=evaluations,
         rng=np.random.default_rng(second),
+        time_limit_s=time_limit_s,
         names=tuple(objective.names),
     )
 

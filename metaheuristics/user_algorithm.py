@@ -1,20 +1,23 @@
 """User code as an algorithm: settings, a class or function that makes them, or a plain function."""
 
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, is_dataclass, replace
+from threading import Event, Thread, get_ident
 from typing import Any
 
 import numpy as np
 
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Algorithm, Array, CallingSearch, Evaluate, Rule, Start, to_real_array
+from metaheuristics.interface import Algorithm, Array, CallingSearch, Ended, Evaluate, Rule, Start, to_real_array
 from metaheuristics.preparation import check_population
 
 ARGUMENTS = ("f", "lower", "upper", "evaluations", "seed")
 # Value of an infeasible point under feasibility rules for a function that expects one number: more than any objective.
 INFEASIBLE = 1e9
 FAILED = 1e30
+GRACE_S = 1.0  # for a function to return after its run
 
 
 def to_algorithm(user: Any, name: str, settings: Mapping[str, Any] | None = None) -> Algorithm:
@@ -62,10 +65,13 @@ def to_algorithm(user: Any, name: str, settings: Mapping[str, Any] | None = None
 class PlainFunction:
     """A function `minimise(f, lower, upper, evaluations, seed)` that minimises `f` by itself.
 
-    The loop counts the calls of `f`, keeps the best point, and ends the function within a call once a limit is reached; its
-    return value is ignored. `f(x)` of one point (n,) is a float, `f(X)` of many (P, n) an array (P,). It is one number for
-    objective and constraints: the objective where a point is feasible, and 1e9 plus the violation elsewhere, so that its order
-    is Deb's; under a static penalty it is objective plus weighted violation. 1e30 marks a failed evaluation.
+    The loop counts the calls of `f`, from any thread, keeps the best point, and ends the function within a call once a limit is
+    reached; its return value is ignored. A function that goes on nevertheless is left alone, as is one that calls no `f` until
+    the time limit.
+
+    `f(x)` of one point (n,) is a float, `f(X)` of many (P, n) an array (P,). It is one number for objective and constraints: the
+    objective where a point is feasible, and 1e9 plus the violation elsewhere, so that its order is Deb's; under a static penalty
+    it is objective plus weighted violation. 1e30 marks a failed evaluation.
 
     Raises:
         SearchError: the function does not take these arguments.
@@ -110,24 +116,61 @@ def combine(f: Array, violation: Array, rule: Rule) -> Array:
 
 
 class _FunctionSearch(CallingSearch):
+    """A run of a function, in a thread of its own, which cannot outlast the run."""
+
     def __init__(self, settings: PlainFunction, start: Start) -> None:
-        self._settings = settings
-        self._start = start
+        self._settings, self._start = settings, start
+        self._over, self._left = Event(), Event()  # the run, and the function
+        self._error: BaseException | None = None
+        self._ended = False  # by the run
 
     def run(self, evaluate: Evaluate) -> str:
-        n = len(self._start.lower)
+        thread = Thread(target=self._call, args=(evaluate,), name=self._settings.name, daemon=True)
+        thread.start()
+        if not self._over.wait(self._start.time_limit_s):
+            return "time limit reached"
+        self._left.wait(GRACE_S)
+        if self._error is not None and not self._ended:
+            raise self._error
+        return "the function returned"
+
+    def _call(self, evaluate: Evaluate) -> None:
+        start, settings = self._start, self._settings
+        lower, upper, seed = start.lower.copy(), start.upper.copy(), int(start.rng.integers(2**31))
+        try:
+            settings.function(self._make_f(evaluate), lower, upper, start.evaluations, seed, **settings.settings)
+        except BaseException as error:
+            self._error = error
+        self._left.set()
+        self._over.set()
+
+    def _make_f(self, evaluate: Evaluate) -> Callable[[Any], Any]:
+        shape, owner, point = self._start.lower.shape, get_ident(), evaluate.point
 
         def f(x: Any) -> Any:
             try:
-                points = to_real_array(x)
-            except (TypeError, ValueError) as error:
-                raise SearchError(f"f was called with something other than numbers: {error}") from error
-            if points.ndim not in (1, 2) or points.shape[-1] != n or not points.size:
-                raise SearchError(f"f takes one point of shape ({n},) or points of shape (P, {n}); got {points.shape}")
-            cost = combine(*evaluate(np.array(points, ndmin=2)))
-            return float(cost[0]) if points.ndim == 1 else cost
+                if point is not None and type(x) is np.ndarray and x.dtype == np.float64 and x.shape == shape:
+                    value, violation = point(x)
+                    return FAILED if math.isinf(value) else value if violation <= 0.0 else INFEASIBLE + violation
+                points = self._read_points(x)
+                cost = combine(*evaluate(np.array(points, ndmin=2)))
+                return float(cost[0]) if points.ndim == 1 else cost
+            except Ended:
+                if self._ended and get_ident() == owner:  # it goes on, perhaps for ever
+                    self._left.set()
+                    Event().wait()
+                self._ended = True
+                self._over.set()
+                raise
 
-        start, settings = self._start, self._settings
-        lower, upper = start.lower.copy(), start.upper.copy()
-        settings.function(f, lower, upper, start.evaluations, int(start.rng.integers(2**31)), **settings.settings)
-        return "the function returned"
+        return f
+
+    def _read_points(self, x: Any) -> Array:
+        n = len(self._start.lower)
+        try:
+            points = to_real_array(x)
+        except (TypeError, ValueError) as error:
+            raise SearchError(f"f was called with something other than numbers: {error}") from error
+        if points.ndim not in (1, 2) or points.shape[-1] != n or not points.size:
+            raise SearchError(f"f takes one point of shape ({n},) or points of shape (P, {n}); got {points.shape}")
+        return points

@@ -85,11 +85,11 @@ class Instance:
 
     def objective(self, x: Array | Sequence[float]) -> float:
         """Return the objective at one point x (n,), to be minimised."""
-        return float(self(np.asarray(x, dtype=float)[None])[0][0])
+        return self._objective.point(self._physical(np.asarray(x, dtype=float)))[0]
 
     def violation(self, x: Array | Sequence[float]) -> float:
         """Return the total violation at one point x (n,): zero if and only if it is feasible."""
-        return float(self(np.asarray(x, dtype=float)[None])[1][0])
+        return self._objective.point(self._physical(np.asarray(x, dtype=float)))[1]
 
     def rows(self, X: Array) -> Array:
         """Return the rows G(X) (P, m), satisfied where <= 0, in units of each row's scale; ``row_names`` has their names."""

@@ -1,13 +1,14 @@
 """Plain functions and user-defined objects as algorithms: counted, stopped and judged as all others."""
 
 from collections.abc import Callable
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import dual_annealing
 
-from metaheuristics import Deb, ParticleSwarm, SearchError, StaticPenalty, minimize, to_algorithm
+from metaheuristics import Deb, EarlyStop, ParticleSwarm, SearchError, StaticPenalty, minimize, to_algorithm
 from metaheuristics.interface import Array
 from metaheuristics.user_algorithm import FAILED, INFEASIBLE
 
@@ -109,3 +110,93 @@ def test_objects_classes_and_makers_are_algorithms() -> None:
 def test_other_objects_are_rejected(own: Any, settings: dict[str, Any], message: str) -> None:
     with pytest.raises(SearchError, match=message):
         to_algorithm(own, "own", settings)
+
+
+class PointDisk(Disk):
+    """The same with a function of one point."""
+
+    def point(self, x: Array) -> tuple[float, float]:
+        f, violation = self(x[None])
+        return float(f[0]), float(violation[0])
+
+
+@pytest.mark.parametrize("handling", [Deb(), StaticPenalty(weight=2.0)])
+def test_the_fast_way_for_one_point_changes_nothing(handling: Any) -> None:
+    def walk(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
+        rng, x = np.random.default_rng(seed), np.zeros(2)
+        values.append(f(np.array([np.nan, 0.0])))
+        while True:
+            y = np.clip(x + rng.normal(0.0, 0.3, 2), lower, upper)
+            values.append(f(y))
+            x = y if values[-1] < f(x) else x
+
+    results, told = [], []
+    for disk in (Disk(), PointDisk()):
+        values: list[float] = []
+        results.append(minimize(disk, to_algorithm(walk, "walk"), evaluations=200, handling=handling))
+        told.append(values)
+        assert disk.calls == 200
+    slow, fast = results
+    assert told[0] == told[1] and len(told[0]) > 90
+    np.testing.assert_array_equal(slow.x, fast.x)
+    np.testing.assert_array_equal(slow.history.objective, fast.history.objective)
+    assert (slow.failed_evaluations, fast.failed_evaluations) == (1, 1)
+    stop = EarlyStop(target=slow.objective)
+    assert minimize(PointDisk(), to_algorithm(walk, "walk"), evaluations=200, stop=stop).reasons == ("target reached",)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")  # Python's own hook is silent
+def test_eight_threads_call_f_and_all_are_counted() -> None:
+    def threads(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
+        def walk(seed: int) -> None:
+            rng = np.random.default_rng(seed)
+            while True:
+                f(rng.uniform(lower, upper))
+
+        workers = [Thread(target=walk, args=(seed,)) for seed in range(8)]
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+
+    disk = PointDisk()
+    result = minimize(disk, to_algorithm(threads, "threads"), evaluations=500)
+    assert (result.evaluations, disk.calls, result.reasons) == (500, 500, ("evaluation budget used",))
+
+
+def test_a_bare_except_does_not_outlast_the_budget() -> None:
+    def deaf(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        while True:
+            try:
+                f(rng.uniform(lower, upper))
+            except:  # noqa: E722
+                pass
+
+    disk = Disk()
+    result = minimize(disk, to_algorithm(deaf, "deaf"), evaluations=100)
+    assert (result.evaluations, disk.calls, result.reasons) == (100, 100, ("evaluation budget used",))
+
+
+def test_a_function_that_hangs_ends_at_the_time_limit_with_its_best_point() -> None:
+    def hanging(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
+        for share in share_of_calls:
+            f(share * np.ones(2))
+        Event().wait()
+
+    share_of_calls = [0.5, -0.5, 0.1]
+    algorithm, stop = to_algorithm(hanging, "hanging"), EarlyStop(time_limit_s=0.2)
+    result = minimize(Disk(), algorithm, evaluations=100, stop=stop)
+    assert (result.evaluations, result.objective, result.reasons) == (3, -1.0, ("time limit reached",))
+    share_of_calls = []
+    with pytest.raises(SearchError, match="f was never called: time limit reached"):
+        minimize(Disk(), algorithm, evaluations=100, stop=stop)
+
+
+def test_an_error_of_the_function_is_its_own() -> None:
+    def failing(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
+        f(np.zeros(2))
+        raise ZeroDivisionError("mine")
+
+    with pytest.raises(ZeroDivisionError, match="mine"):
+        minimize(Disk(), to_algorithm(failing, "failing"), evaluations=100)

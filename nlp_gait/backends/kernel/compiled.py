@@ -65,6 +65,15 @@ class NativeRows:
         if self._evaluate(local.inputs, shared, local.outputs, rows, local.address):
             raise RuntimeError("the compiled kernel reported a failure")
 
+    def bind(self, inputs: Sequence[Array], outputs: Sequence[Array | None]) -> Callable[[], object]:
+        """Return a function that evaluates one row of inputs and outputs that live as long as it, for one thread."""
+        memory = np.empty(-(-self._memory_size // 8))
+        given, results = (_POINTER * len(inputs))(), (_POINTER * len(outputs))()
+        given[:] = [get_address(array) for array in inputs]
+        results[:] = [None if array is None else get_address(array) for array in outputs]
+        shared, address = bytes(len(inputs)), get_address(memory)
+        return lambda: memory is not None and self._evaluate(given, shared, results, 1, address)
+
 
 def get_address(array: Array) -> int:
     """Return the address of an array's first number."""
@@ -175,6 +184,7 @@ class CompiledObjective:
         self.groups = tuple(name.partition("[")[0] for name in self.row_names[: -len(self.names)])
         self._threads = RowThreads(threads)
         self._rebuild = rebuild
+        self._local = threading.local()
 
     def __call__(self, X: Array | Mapping[str, float]) -> tuple[Array, Array]:
         """Return (P,) costs and (P,) violations of candidates X (P, n), or of one candidate by name, as in ``solution.x``.
@@ -186,6 +196,26 @@ class CompiledObjective:
         X = self._check(X)
         f, violation = np.empty(len(X)), np.empty(len(X))
         self._evaluate(X, f, violation, None)
+        return f, violation
+
+    def point(self, x: Array | Sequence[float] | Mapping[str, float]) -> tuple[float, float]:
+        """Return cost and violation of one candidate x (n,): several times faster than a batch of one."""
+        local = self._local
+        if not hasattr(local, "evaluate"):  # arrays of the calling thread
+            local.x, local.values = np.empty(len(self.names)), np.empty(2)
+            inputs, outputs = (local.x, *self._shared), (local.values[:1], None, local.values[1:])
+            if isinstance(self._evaluate_rows, NativeRows):
+                local.evaluate = self._evaluate_rows.bind(inputs, outputs)
+            else:
+                inputs = (local.x[None], *self._shared)
+                local.evaluate = partial(self._evaluate_rows, inputs, SHARED, outputs, 1)
+        if type(x) is np.ndarray and x.dtype == local.x.dtype and x.shape == local.x.shape:
+            local.x[:] = x
+        else:
+            local.x[:] = self._check(x if isinstance(x, Mapping) else [x])[0]
+        if local.evaluate():
+            raise RuntimeError("the compiled kernel reported a failure")
+        f, violation = local.values.tolist()
         return f, violation
 
     def constraints(self, X: Array | Mapping[str, float]) -> Array:
@@ -205,7 +235,7 @@ class CompiledObjective:
 
         self._threads.run(len(X), evaluate)
 
-    def _check(self, X: Array | Mapping[str, float]) -> Array:
+    def _check(self, X: object) -> Array:
         if isinstance(X, Mapping):
             return self.problem.check_x(X)[None]
         array = np.require(to_floats(f"X of {self.problem.name}", X), requirements=("C", "A"))

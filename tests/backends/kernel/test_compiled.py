@@ -11,7 +11,7 @@ from casadi import exp, sin
 
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
+from nlp_gait.backends.kernel.compiled import CompiledObjective, InterpretedRows, compile_objective
 from nlp_gait.backends.kernel.compiler import native_lanes
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
@@ -238,3 +238,18 @@ def test_numbers_of_every_kind_that_mean_one_are_taken() -> None:
     exact = [[Fraction(value) for value in row] for row in X.tolist()]
     for given in (unmasked, exact, X.astype(np.longdouble), X.astype(object)):
         assert np.array_equal(objective(given)[0], objective(X)[0])
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_one_point_has_the_values_of_a_batch_of_one(compiled: bool) -> None:
+    problem = toy(corner)
+    objective = compile_objective(problem, require_compiler=True)
+    if not compiled:
+        objective = CompiledObjective(problem, InterpretedRows(problem), 1, compile_objective)
+    for x in ([0.0, 1.5], [2.5, 0.1], [np.nan, 0.0]):
+        f, violation = objective(np.array([x]))
+        assert objective.point(np.array(x)) == objective.point(x) == (f[0], violation[0])
+    assert objective.point({"x": 0.0, "y": 1.5}) == pytest.approx((2.0, 5.0))
+    for wrong in ([1.0], np.ones((1, 2)), np.array([True, False]), ["1", "2"]):
+        with pytest.raises(InputError):
+            objective.point(wrong)  # type: ignore[arg-type]
