@@ -7,12 +7,12 @@ names to ``docs/generated``, and the gallery runs the examples.
 from __future__ import annotations
 
 import sys
-import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+import nlp_gait  # noqa: E402
 from docs.pages import algorithms, api, commands, front, gallery, gradient, model, numbers, papers, playground, problems  # noqa: E402
 from docs.pages.api import linked  # noqa: E402
 
@@ -20,7 +20,7 @@ project = "nlp-gait"
 author = "The authors of nlp-gait"
 project_copyright = "the authors of nlp-gait; BSD-3-Clause"
 smartquotes = False  # two hyphens are an option
-release = version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+release = version = nlp_gait.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery", "docs.mathml"]
 exclude_patterns = [
     "pages",

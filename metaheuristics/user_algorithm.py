@@ -66,7 +66,7 @@ class PlainFunction:
     """A function `minimise(f, lower, upper, evaluations, seed)` that minimises `f` by itself.
 
     The loop counts the calls of `f`, from any thread, keeps the best point, and ends the function within a call once a limit is
-    reached; its return value is ignored. A function that goes on nevertheless is left alone, as is one that calls no `f` until
+    reached; its return value is ignored. A function that continues nevertheless is left alone, as is one that calls no `f` until
     the time limit.
 
     `f(x)` of one point (n,) is a float, `f(X)` of many (P, n) an array (P,). It is one number for objective and constraints: the
@@ -156,7 +156,7 @@ class _FunctionSearch(CallingSearch):
                 cost = combine(*evaluate(np.array(points, ndmin=2)))
                 return float(cost[0]) if points.ndim == 1 else cost
             except Ended:
-                if self._ended and get_ident() == owner:  # it goes on, perhaps for ever
+                if self._ended and get_ident() == owner:  # it continues, perhaps for ever
                     self._left.set()
                     Event().wait()
                 self._ended = True

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from nlp_gait.formulation.solution import Solution as Solution
     from nlp_gait.loading import load as load
 
+__version__ = "0.2.0"
 # Imported on first use: a search needs no NLP solver, a solve no kernel, and the command line starts quickly.
 _PUBLIC = {
     "nlp_gait.errors": "GaitError",
@@ -51,10 +52,6 @@ __all__ = sorted([*_PLACES, "compare"])
 
 def __getattr__(name: str) -> Any:
     """Import or read a public name when it is first used."""
-    if name == "__version__":
-        from importlib.metadata import version
-
-        return version("nlp-gait")
     if name == "compare":
         from compare.report.compared_study import compare
 

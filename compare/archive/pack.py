@@ -7,10 +7,11 @@ import tempfile
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from importlib.metadata import distributions, version
+from importlib.metadata import distributions
 from importlib.resources import files
 from pathlib import Path
 
+import nlp_gait
 from compare.archive.unpack import MANIFEST, ArchiveManifest, unpack_archive
 from compare.study.origin import format_now, hash_installed_code
 from compare.study.record import RunRecord
@@ -63,7 +64,7 @@ def write_archive(out: Path, content: dict[str, bytes], robots: Mapping[str, str
     manifest = ArchiveManifest(
         schema=1,
         created=format_now(),
-        version=version("nlp-gait"),
+        version=nlp_gait.__version__,
         code_sha256=hash_installed_code(),
         robots=robots,
         files={name: hashlib.sha256(data).hexdigest() for name, data in content.items()},
@@ -145,5 +146,5 @@ def _make_readme(records: Sequence[RunRecord], manifest: Manifest, content: Iter
     template = files("compare.archive").joinpath("readme.md").read_text(encoding="utf-8")
     problems, solvers = (sorted({getattr(r, key) for r in records}) for key in ("problem", "solver"))
     title = f"{len(records)} runs of {', '.join(solvers)} on {', '.join(problems)}"
-    facts = {"version": version("nlp-gait"), "sha": hash_installed_code()[:8]}
+    facts = {"version": nlp_gait.__version__, "sha": hash_installed_code()[:8]}
     return template.format(title=title, commands=commands, code=code, **facts)

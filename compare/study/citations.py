@@ -4,10 +4,10 @@ import inspect
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
+import nlp_gait
 from nlp_gait.errors import unknown
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.gaitbench.facts import BY_ID
@@ -25,7 +25,7 @@ def find_citations(name: str | None = None) -> list[str]:
         UserCodeError: a user-defined problem cannot be loaded.
     """
     text = (files("compare.study") / "citations.toml").read_text(encoding="utf-8")
-    table = tomllib.loads(text.replace("VERSION", version("nlp-gait")))
+    table = tomllib.loads(text.replace("VERSION", nlp_gait.__version__))
     papers, sources = table["papers"], [*table["papers"].values(), table["suite"]]
     if name in papers:
         sources = [papers[name]]

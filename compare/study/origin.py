@@ -8,6 +8,7 @@ from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 
+import nlp_gait
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.backends.kernel.compiler import read_cpu_info
 from nlp_gait.user_code import remove_comments
@@ -29,7 +30,7 @@ class Origin:
     def make(cls) -> "Origin":
         """Return the origin of a run in this process."""
         return cls(
-            version=version("nlp-gait"),
+            version=nlp_gait.__version__,
             casadi=version("casadi"),
             machine=f"{describe_processor()}, {describe_system()}",
         )

@@ -1,6 +1,7 @@
 """The C++ compiler of this machine, its version and flags; it runs with a time limit."""
 
 import functools
+import logging
 import os
 import platform
 import shlex
@@ -19,6 +20,7 @@ from nlp_gait.errors import CompilerError
 
 TIME_LIMIT_S = 300.0
 VERSION_TIME_LIMIT_S = 20.0
+SILENT_S = 5.0  # after which the user is told what is waited for
 COMMON_NAMES = ("c++", "g++", "clang++")
 HOW_TO_GET_ONE = (
     "to get a compiler: pip install ziglang, or your system's g++ or clang++, or name one in the environment "
@@ -115,7 +117,12 @@ def _run(command: Sequence[str], time_limit_s: float) -> str:
     finally:
         os.close(read_end)
     try:
-        output, messages = process.communicate(timeout=time_limit_s)
+        try:
+            output, messages = process.communicate(timeout=SILENT_S)
+        except subprocess.TimeoutExpired:
+            waiting = "waiting for the compiler %s, which has run for %g s (limit: %g s)"
+            logging.getLogger("nlp_gait").warning(waiting, program, SILENT_S, time_limit_s)
+            output, messages = process.communicate(timeout=time_limit_s - SILENT_S)
     except subprocess.TimeoutExpired as error:
         raise CompilerError(f"{program} did not end within {time_limit_s:g} s") from error
     finally:
