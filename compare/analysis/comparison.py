@@ -19,7 +19,7 @@ from compare.analysis.record_statistics import (
     make_curve,
     tie,
 )
-from compare.analysis.units import format_percent, name_solver, with_unit
+from compare.analysis.units import FOUND, format_gap, name_solver, with_unit
 from compare.study.record import RunRecord, find_best, group_by
 from compare.study.references import BETTER, Reference, find_reference
 from compare.study.task import GRADIENT_SOLVERS, SOURCE
@@ -27,7 +27,6 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Objective
 
 SMALLEST_GAP = 1e-8  # that is shown; points may differ from the best known value by less in their last digits
-FOUND = 1e-6  # a run with at most this gap has reached the best known value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -155,11 +154,11 @@ class Comparison:
 
     def format_gap(self, gap: float | None) -> str:
         """Format a gap in percent, or in the objective's unit from a value near zero; ``FOUND`` is the least one shown."""
-        if gap is None or not math.isfinite(gap) or gap == 0.0:
-            return "-" if gap is None or not math.isfinite(gap) else "0 %"
-        if is_zero(self.reference):
-            return f"< {ZERO:g}" if abs(gap) < ZERO else with_unit(gap, self.objective.unit, ".2g")
-        return f"< {100 * FOUND:.4f} %" if abs(gap) < FOUND else format_percent(gap)
+        if gap is None:
+            return "-"
+        if not is_zero(self.reference) or not math.isfinite(gap) or gap == 0.0:
+            return format_gap(gap)
+        return f"< {ZERO:g}" if abs(gap) < ZERO else with_unit(gap, self.objective.unit, ".2g")
 
     def gap(self, cost: float) -> float:
         """Return the distance of a cost from the best known objective, see ``compute_gap``; 0 if better within the tolerance."""

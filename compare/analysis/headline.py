@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from statistics import median
 
 from compare.analysis.best_known import compute_gap, is_zero
-from compare.analysis.comparison import FOUND, Comparison, SolverRuns, index_solvers
+from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
 from compare.analysis.overview import count_wins, list_user_solvers
-from compare.analysis.units import format_percent, join_words, name_solver, with_unit
+from compare.analysis.units import FOUND, format_gap, join_words, name_solver, with_unit
 from compare.study.record import RunRecord, find_best
 from compare.study.references import describe_gap, find_reference
 from nlp_gait.gaitbench.facts import SIX_DIGITS
@@ -192,7 +192,7 @@ def write_overall_headline(comparisons: Sequence[Comparison]) -> str:
     if any(is_zero(comparison.reference) for comparison in comparisons):
         gaps = {}  # in percent of some, and in units of others
     typical = [
-        f"{name_solver(name)} {format_percent(0.0 if gap <= FOUND else gap) if math.isfinite(gap) else 'mostly infeasible'}"
+        f"{name_solver(name)} {format_gap(gap) if math.isfinite(gap) else 'mostly infeasible'}"
         for name, gap in sorted(gaps.items(), key=lambda item: item[1])
     ]
     if typical:
@@ -253,5 +253,5 @@ class LiveGaps:
         value, known, objective = best.verdict.objective, self._known[name], best.inputs.objective
         shown = f"best {with_unit(value, objective.unit, '.6g')}"
         if known is not None and not is_zero(known):
-            shown = f"best gap {format_percent(max(compute_gap(value, known, objective), 0.0))}"
+            shown = f"best gap {format_gap(max(compute_gap(value, known, objective), 0.0))}"
         return f"{shown} ({name}, {name_solver(best.solver)})"

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from nlp_gait.formulation import GaitProblem
 
+FOUND = 1e-6  # a run with at most this gap has reached the best known value
 ROUNDING = 1e-12  # a share below this is shown as zero
 SIX_DECIMALS = ".6f"
 SMALL, LARGE = 5e-7, 1e12  # six decimals show zero for less, and digits without a meaning for more
@@ -56,6 +57,13 @@ def format_percent(share: float | None) -> str:
         return f"{percent:.1e} %"
     decimals = max(0, 1 - math.floor(math.log10(abs(percent)))) if percent else 0
     return f"{percent:.{decimals}f} %"
+
+
+def format_gap(gap: float) -> str:
+    """Format a relative gap in percent; those below ``FOUND``, which reach the reference, are not distinguished."""
+    if gap == 0.0 or not math.isfinite(gap):
+        return "-" if gap else "0 %"
+    return f"< {100 * FOUND:.4f} %" if abs(gap) < FOUND else format_percent(gap)
 
 
 def make_heading(words: str, unit: str) -> str:

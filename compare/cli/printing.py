@@ -3,6 +3,7 @@
 import json
 import shlex
 import sys
+import threading
 import time
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -25,6 +26,9 @@ MOST_NAMED = 3  # written files; of more, the first one is named
 LONGEST_CELL = 24  # characters of a word in a table that are not wrapped
 LONGEST_SENTENCE = 2000  # characters of an error message, in which a value can be a whole file
 LOG_PERIOD_S = 30.0  # between lines of progress in a log
+FIRST_S, REWRITE_S = 1.0, 0.2  # until a line of progress on a terminal, and between its changes
+COLUMNS = 79  # of a line of progress, at most
+CLEAR = "\r\x1b[K"  # of the line of a terminal
 
 
 class Rows(NamedTuple):
@@ -68,12 +72,18 @@ def escape_controls(text: str) -> str:
 
 
 stderr = PlainConsole(stderr=True, highlight=False, markup=False)
+shown: list["ProgressLine | None"] = [None]  # the line of progress on the terminal
 stdout = PlainConsole(highlight=False, markup=False)  # 80 columns without a terminal
 
 
 def say(sentence: str) -> None:
-    """Print a sentence on stderr."""
-    stderr.print(sentence, soft_wrap=True)
+    """Print a sentence on stderr, in place of a line of progress, which is then written again."""
+    if shown[0] is None:
+        stderr.print(sentence, soft_wrap=True)
+        return
+    with shown[0].lock:
+        shown[0].clear()
+        stderr.print(sentence, soft_wrap=True)
 
 
 def say_error(message: str) -> None:
@@ -143,56 +153,80 @@ def tabulate(title: str, items: Iterable[T], columns: Mapping[str, Callable[[T],
     return Rows(title, list(columns), [[cell(item) for cell in columns.values()] for item in items])
 
 
+class ProgressLine:
+    """A line on a terminal that is rewritten, from the first second on; in a log, a line every half minute."""
+
+    def __init__(self, description: str, total: int | None, on_terminal: bool) -> None:
+        """Begin; ``total`` is None for work of unknown length."""
+        self.description, self.total, self.on_terminal = description, total, on_terminal
+        self.done = self.fresh = 0
+        self.note = ""
+        self.started = time.monotonic()
+        self.next_s = FIRST_S if on_terminal else LOG_PERIOD_S
+        self.lock, self.ended = threading.RLock(), threading.Event()
+
+    def __call__(self, note: str, steps: int = 1) -> None:
+        """Count a step and show its note; more steps than one were done by an earlier command."""
+        self.done, self.note = self.done + steps, "; ".join(note.splitlines())
+        self.fresh += steps == 1
+        if not self.on_terminal:
+            self.show()
+
+    def describe(self) -> str:
+        """Return for example ``runs 48 of 106, 31 s left, best gap 0.0046 % (nao-ssp, ACO)``."""
+        seconds, of = time.monotonic() - self.started, "" if self.total is None else f" of {self.total:,}"
+        left = f"{format_duration(seconds)}"
+        if self.total is not None and self.fresh:
+            left = f"{format_duration(seconds / self.fresh * max(self.total - self.done, 0))} left"
+        return escape_controls(", ".join(filter(None, (f"{self.description} {self.done:,}{of}", left, self.note))))
+
+    def show(self) -> None:
+        """Write the line if it is time for it."""
+        with self.lock:
+            if time.monotonic() - self.started < self.next_s or self.ended.is_set():
+                return
+            if not self.on_terminal:
+                self.next_s += LOG_PERIOD_S
+                say(self.describe())
+                return
+            stderr.file.write(CLEAR + self.describe()[: min(COLUMNS, stderr.width - 1)])
+            stderr.file.flush()
+
+    def clear(self) -> None:
+        """Remove the line, before something else is printed."""
+        if self.on_terminal:
+            stderr.file.write(CLEAR)
+            stderr.file.flush()
+
+    def keep_showing(self) -> None:
+        """Rewrite the line until the work ends."""
+        while not self.ended.wait(REWRITE_S):
+            self.show()
+
+
+def format_duration(seconds: float) -> str:
+    """Return for example ``31 s``, ``5 min`` or ``2.5 h``."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
+
+
 @contextmanager
 def show_progress(description: str, total: int | None) -> Iterator[Callable[..., None]]:
     """Show progress on stderr, of unknown length if total is None.
 
-    The yielded function takes a note, whose lines are shown below the bar, and steps other than 1.
+    The yielded function takes a note, and steps other than 1 for what an earlier command did.
     """
-    if not stderr.is_terminal:
-        yield _ProgressLog(description, total)
-        return
-    from rich.console import Group
-    from rich.live import Live
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    progress = Progress(*columns, console=stderr)
-    task = progress.add_task(escape_controls(description), total=total)
-    with Live(progress, console=stderr, transient=True) as live:
-
-        def advance(note: str, steps: int = 1) -> None:
-            progress.advance(task, steps)
-            live.update(Group(progress, Text(escape_controls(note))))
-
-        yield advance
-
-
-class _ProgressLog:
-    """Progress without a terminal: an occasional line for the log of long work."""
-
-    def __init__(self, description: str, total: int | None) -> None:
-        self.description, self.total, self.done = description, total, 0
-        self.started = self.reported = time.monotonic()
-
-    def __call__(self, note: str, steps: int = 1) -> None:
-        self.done += steps
-        now = time.monotonic()
-        if now - self.reported >= LOG_PERIOD_S:
-            self.reported = now
-            of = "" if self.total is None else f" of {self.total}"
-            lines = note.replace("\n", "; ")
-            say(f"{self.description}: {self.done}{of} after {now - self.started:.0f} s; {lines}")
+    line = ProgressLine(description, total, stderr.is_terminal)
+    before, shown[0] = shown[0], line
+    ticker = threading.Thread(target=line.keep_showing, daemon=True)
+    if line.on_terminal:
+        ticker.start()
+    try:
+        yield line
+    finally:
+        line.ended.set()
+        shown[0] = before
+        if line.on_terminal:
+            ticker.join()
+            line.clear()
