@@ -28,7 +28,7 @@ class HipHeight(Limit):
     parameters = make_parameters(("least_hip_m", "m", 0.2, "least height of the hip", 0.0, 1.0))
 
     def add(self, at, samples, ops):
-        return [make_rows_at_samples("hip_height", "m", samples.read("hip")[2, :], ("hip",), at["least_hip_m"])], {}
+        return [make_rows_at_samples("hip_height", "m", samples.hip[2, :], ("hip",), at["least_hip_m"])], {}
 """
 
 
@@ -69,20 +69,22 @@ def test_every_limit_has_rows_in_every_kind_of_phase(problems: Callable[[str], G
     assert np.isfinite(added).all()
 
 
-def evaluate_rows(limit: Limit, **samples: Any) -> tuple[np.ndarray, np.ndarray]:
+def evaluate_rows(limit: Limit, values: dict[Any, MX], **samples: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return values (m,) of a limit's rows and its indexes on samples by hand."""
-    found = Samples(joints=(), moving=(), duration=MX(1.0), grid=Grid(intervals=4), **samples)
+    found = Samples(
+        joints=(), moving=(), duration=MX(1.0), grid=Grid(intervals=4), evaluate=values.__getitem__, **samples
+    )
     names = [parameter.name for parameter in limit.parameters]
     at = Point.of(MX(0, 1), MX(DM([parameter.default for parameter in limit.parameters])), (), names)
     rows, indexes = limit.add(at, found, Exact())
-    values = [np.array(ca.evalf(row.value)).ravel() for row in rows]
-    return np.concatenate(values or [np.zeros(0)]), np.array([float(ca.evalf(v)) for v in indexes.values()])
+    found_values = [np.array(ca.evalf(row.value)).ravel() for row in rows]
+    return np.concatenate(found_values or [np.zeros(0)]), np.array([float(ca.evalf(v)) for v in indexes.values()])
 
 
 def test_friction_by_hand() -> None:
     wrench = MX(DM([[3.0, 0.0], [4.0, -6.0], [10.0, 10.0], [0, 0], [0, 0], [0, 0]]))
     values, ratios = evaluate_rows(
-        FrictionCone(), standing=("L",), progress=MX(DM([[0.0, 1.0]])), values={"wrench_L": wrench}
+        FrictionCone(), standing=("L",), progress=MX(DM([[0.0, 1.0]])), values={Samples.wrench_left: wrench}
     )
     np.testing.assert_allclose(values, [0.6 * 10 - 5, 0.6 * 10 - 6], atol=1e-6)
     np.testing.assert_allclose(ratios, [0.6], atol=1e-6)
@@ -92,7 +94,7 @@ def test_clearance_by_hand() -> None:
     progress = MX(DM([[0.0, 0.25, 0.5, 0.75, 1.0]]))
     heights = MX(DM([[0.0, 0.006, 0.009, 0.006, 0.0]]))
     values, highest = evaluate_rows(
-        FootClearance(), standing=("L",), progress=progress, values={"swing_heights": heights}
+        FootClearance(), standing=("L",), progress=progress, values={Samples.swing_heights: heights}
     )
     quarter = 0.01 * 16 * (0.25 * 0.75) ** 2
     np.testing.assert_allclose(values, [0.006 - quarter, -0.001, 0.006 - quarter], atol=1e-15)
@@ -208,7 +210,7 @@ def test_unknown_limits_are_refused(limits: str, message: str) -> None:
 def test_a_limit_that_reads_what_a_motion_lacks_is_refused() -> None:
     class Unknown(Limit):
         def add(self, at: Point, samples: Samples, ops: Any) -> Any:
-            return [], {"index": ca.mmax(samples.read("temperature"))}
+            return [], {"index": ca.mmax(samples.temperature)}
 
     problem = nlp_gait.load("nao-ssp").with_limits(single_support=[Unknown()])
     with pytest.raises(GaitError, match="temperature"):

@@ -8,7 +8,7 @@ import casadi as ca
 from casadi import MX
 
 from nlp_gait.formulation import Objective, Parameter, Point
-from nlp_gait.gaits.biped.samples import Samples
+from nlp_gait.gaits.biped.samples import Quantity, Samples
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 POWER = Objective(name="power", unit="W")
@@ -33,6 +33,7 @@ class Goal:
     objective: Objective = POWER  # name and unit
     power: PowerModel = compute_paper_power  # of the motors; if it is not the paper's, the paper's is an index too
     figure: Callable[[Samples], MX] | None = None  # of the samples; None for power
+    reads: tuple[Quantity, ...] = ()  # see ``Limit.reads``
 
     def evaluate(self, point: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX]]:
         """Return the objective and the indexes: power, and what is minimised instead, or the power of the paper's motors."""
@@ -54,6 +55,7 @@ INSTEAD = {
     "jerk": Goal(
         objective=Objective(name="joint_jerk", unit="rad^2/s^6"),
         figure=lambda samples: _average_squared_rate(samples.qdd, samples),
+        reads=(Samples.qdd,),
     ),
     "torque": Goal(
         objective=Objective(name="squared_torque", unit="(Nm)^2"),

@@ -9,14 +9,14 @@ plan do no work on such motions, and the momentum along each of them is kept (Ga
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import casadi as ca
 from casadi import MX, SX
 
 from nlp_gait.formulation import Constraint, InstantPoint, Point, Variable
 from nlp_gait.gaits.biped.body import Body, Support
-from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
+from nlp_gait.gaits.biped.limits import make_rows
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Samples
 from nlp_gait.gaits.biped.switch import Switch, SwitchState, make_state_variables, read_rates
@@ -26,15 +26,6 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 LANDING, LANDING_M_S = "foot_vx_touch_down_m_s", 0.5  # variable; its greatest value, of NAO
 AFTER = "after_touch_down"  # in names of the variables of the velocities after it
-
-
-class ReadRates(Limit):
-    """Not a limit: it asks a phase for the angles of all joints and their rates."""
-
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        for name in ("all_q", "all_qd"):
-            samples.read(name)
-        return (), {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,17 +57,17 @@ class Impact(Switch):
     ) -> tuple[list[Constraint], dict[str, MX]]:
         """Return the rows and indexes of any switch, and of the impact: momentum [N s], energy [J], rates [rad/s]."""
         rows, indexes = super().join(phases, point, before, after, ops)
-        single, double = (replace(phases[kind], limits=(ReadRates(),)) for kind in (Support.SINGLE, Support.DOUBLE))
+        single, double = phases[Support.SINGLE], phases[Support.DOUBLE]
         body = single.body
-        landing = single.sample(point, ops, MX(1.0)).read("all_qd")[:, 0]
+        landing = single.sample(point, ops, MX(1.0)).all_qd[:, 0]
         variables = make_rate_variables(body)
         names = [variable.name for variable in variables]
         # The rates of joints are linear in the planned velocities: one instant for each unit velocity.
         units = [point.with_values({name: MX(float(name == unit)) for name in names}) for unit in names]
         instants = double.sample_several(units, ops, MX(0.0))
-        directions = ca.horzcat(*(instant.read("all_qd") for instant in instants))
+        directions = ca.horzcat(*(instant.all_qd for instant in instants))
         jump = directions @ ca.vertcat(*(point[name] for name in names)) - landing
-        impulses, force = make_impulses(body)(instants[0].read("all_q"), jump)
+        impulses, force = make_impulses(body)(instants[0].all_q, jump)
         for variable, change in zip(variables, ca.vertsplit(directions.T @ impulses), strict=True):
             unit = "N s" if variable.unit == "m/s" else "Nm s"
             name = f"{self.name}_momentum_{variable.name.split(AFTER)[0].removesuffix('_')}"

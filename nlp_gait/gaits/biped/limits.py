@@ -13,7 +13,7 @@ from nlp_gait.errors import unknown
 from nlp_gait.formulation import Constraint, InstantPoint, Over, Parameter, Point
 from nlp_gait.formulation.assembly import make_parameters as table
 from nlp_gait.formulation.blocks import make_labels
-from nlp_gait.gaits.biped.samples import BOTH_FEET, CORNERS, Samples
+from nlp_gait.gaits.biped.samples import BOTH_FEET, CORNERS, Quantity, Samples
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -37,6 +37,9 @@ class Limit(ABC):
     """What limits a phase; a subclass overrides what it needs."""
 
     parameters: tuple[Parameter, ...] = ()  # of the limit, which can be changed without rebuilding
+    reads: tuple[
+        Quantity, ...
+    ] = ()  # of the samples, evaluated with those of every phase; others take an evaluation more
 
     @abstractmethod
     def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
@@ -113,6 +116,8 @@ class Closure(Limit):
 
 class DriveLimits(Limit):
     """Torque and speed of every joint within the limits of the robot's file; ``size`` scales NAO's torques."""
+
+    reads = (Samples.qd,)
 
     def __init__(self, robot: Robot, size: float) -> None:
         self._robot, self._size = robot, size
@@ -199,21 +204,25 @@ class BalanceMargins(Limit):
         }
 
 
-class AngleLimits(Limit):
-    """Angles, a quantity of the motion, within the robot's limits between the ends, which a cubic cannot break."""
+class ArmLimits(Limit):
+    """Angles of swinging arms within the robot's limits between the ends, which a cubic cannot break."""
 
-    def __init__(self, name: str, robot: Robot, joints: Sequence[str]) -> None:
-        self._name, self._joints = name, tuple(joints)
+    reads = (Samples.arm_angle,)
+
+    def __init__(self, robot: Robot, joints: Sequence[str]) -> None:
+        self._joints = tuple(joints)
         self._limits = np.array([robot.joint(joint).planning_limits_rad for joint in joints])
 
     def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        angles = samples.read(self._name)[:, 1:-1]
+        angles = samples.arm_angle[:, 1:-1]
         lower, upper = (MX(DM(np.tile(limits, angles.shape[1]))) for limits in self._limits.T)
-        return [make_rows_at_samples(self._name, "rad", angles, self._joints, lower, upper, first=1)], {}
+        return [make_rows_at_samples("arm_angle", "rad", angles, self._joints, lower, upper, first=1)], {}
 
 
 class SplineClearance(Limit):
     """A planned swing foot above the ground between its ends, and high enough in the middle of its path, an x, at half time."""
+
+    reads = (Samples.swing_heights,)
 
     def __init__(self, path: Callable[[InstantPoint, ca.SX], ca.SX], middle: float, least_height: str) -> None:
         self._path, self._middle, self._least_height = path, middle, least_height
@@ -250,6 +259,7 @@ class FrictionCone(Limit):
         ground's force is within the cone of Coulomb's friction.
     """
 
+    reads = (Samples.wrench_left, Samples.wrench_right)
     parameters = table(("friction_coefficient", "1", 0.6, "of both soles on the ground", 0.0, math.inf))
 
     def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
@@ -276,6 +286,7 @@ class FootClearance(Limit):
         gait", Physical Therapy 72(1).
     """
 
+    reads = (Samples.swing_heights,)
     parameters = table(
         ("foot_clearance_m", "m", 0.01, "of the swinging sole in the middle of its swing", 0.0, math.inf)
     )

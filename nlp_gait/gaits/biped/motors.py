@@ -142,6 +142,7 @@ class MotorLimits(Limit):
     """
 
     parameters = (SUPPLY,)
+    reads = (Samples.qd,)
 
     def __init__(self, motors: Motors, ratings: Sequence[Motor]) -> None:
         self._motors, self._ratings = motors, ratings

@@ -1,15 +1,14 @@
 """A support phase of a spatial biped sampled over time: its motion and the loads on motors and ground."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.errors import unknown
 from nlp_gait.formulation import (
     Array,
     Assembly,
@@ -30,14 +29,14 @@ from nlp_gait.gaits.biped.limits import REACH_MARGIN, Limit
 from nlp_gait.gaits.biped.samples import (
     BOTH_FEET,
     LEAST_DURATION,
+    USUAL,
     Instant,
     Loader,
-    Placeholders,
     Planner,
+    Quantity,
+    SampledMotion,
     Samples,
 )
-from nlp_gait.robots.tree import make_tree
-from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.tape import simplify, tabulate_last_input
 from nlp_gait.symbolic.trajectories import Motion
@@ -59,10 +58,20 @@ COLUMNS = {
 }
 
 
-# Time histories by name, and the quantities that they are.
-HISTORIES = {"q": "all_q", "qd": "all_qd", "qdd": "all_qdd", "tau": "torque"}
-HISTORIES |= {name: name for name in ("zmp", "hip", "com", "left_foot", "right_foot")}
-IN_TIME = (*HISTORIES.values(), *(f"wrench_{side}" for side in BOTH_FEET), "attitude", "yaw")
+# Time histories by name.
+HISTORIES = {
+    "q": Samples.all_q,
+    "qd": Samples.all_qd,
+    "qdd": Samples.all_qdd,
+    "tau": Samples.torque,
+    "zmp": Samples.zmp,
+    "hip": Samples.hip,
+    "com": Samples.com,
+    "left_foot": Samples.left_foot,
+    "right_foot": Samples.right_foot,
+}
+IN_TIME = (*HISTORIES.values(), Samples.wrench_left, Samples.wrench_right, Samples.attitude, Samples.yaw)
+ALL_JOINTS = (Samples.all_q, Samples.all_qd, Samples.all_qdd)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -128,6 +137,7 @@ class Phase:
 
     def sample_several(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None = None) -> list[Samples]:
         """Evaluate the phase at several points in one map, each as ``sample`` does; several need analytic derivatives."""
+        motion = self._evaluate(points, ops, phases)
         return [
             Samples(
                 joints=self.body.joints,
@@ -136,54 +146,34 @@ class Phase:
                 grid=self.grid if phases is None else Grid(intervals=max(int(phases.shape[1]) - 1, 1)),
                 duration=point[self.duration],
                 progress=self.grid.progress if phases is None else phases,
-                values=values,
+                evaluate=partial(motion.read, k),
             )
-            for point, values in zip(points, self._evaluate(points, ops, phases), strict=True)
+            for k, point in enumerate(points)
         ]
-
-    def _evaluate(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[dict[str, MX]]:
-        """Return the quantities that limits and the goal read, by name, at each point."""
-        if self.derivatives != "analytic":
-            stages = self._make_stages(self._symbolic_plan(ops), self._names_read)
-            return [self._evaluate_stages(stages, point) for point in points]
-        columns = self._map_instant(points, ops, phases)
-        split = [ca.horzsplit(values, values.shape[1] // len(points)) for values in columns]
-        return [
-            {name: values[k] for name, values in zip(self._names_read, split, strict=True)} for k in range(len(points))
-        ]
-
-    def measure(self, name: str, now: Instant) -> SX:
-        """Return a quantity (k,) of an instant by name, see ``QUANTITIES``; raises UnknownNameError."""
-        if name in now.quantities:
-            return now.quantities[name]
-        if name not in QUANTITIES:
-            raise unknown("quantity of a phase", name, QUANTITIES)
-        return QUANTITIES[name](self, now)
-
-    @cached_property
-    def _requests(self) -> Placeholders:
-        """What limits and the goal read, found by adding them to symbols in place of samples."""
-        parameters = [parameter.name for parameter in self.parameters]
-        x, p = MX.sym("x", len(self.variables)), MX.sym("p", len(parameters))
-        point = Point.of(x, p, self.names, parameters)
-        symbols = Placeholders(
-            joints=self.body.joints,
-            moving=self.moving,
-            standing=self.standing,
-            grid=self.grid,
-            duration=point[self.duration],
-            progress=self.grid.progress,
-            rows=lambda name: int(self.measure(name, self._exact_now).shape[0]),
-        )
-        for limit in self.every_limit:
-            limit.add(point, symbols, Exact())
-        self.goal.evaluate(point, symbols, Exact())
-        return symbols
 
     @property
-    def _names_read(self) -> tuple[str, ...]:
-        """Quantities to evaluate: those of every phase, and what limits and the goal read besides."""
-        return (*BASE, *(name for name in self._requests.names if name not in BASE))
+    def usual(self) -> tuple[Quantity, ...]:
+        """Quantities that are evaluated together: those of every phase, and what its limits are likely to read besides."""
+        reads = (*self.goal.reads, *(quantity for limit in self.every_limit for quantity in limit.reads))
+        return tuple(dict.fromkeys((*USUAL, *reads)))
+
+    def _evaluate(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> SampledMotion:
+        """Return the motion at each point, of which the usual quantities are evaluated."""
+        if self.derivatives != "analytic":
+            planned = self._symbolic_plan(ops)
+
+            def evaluate(quantities: Sequence[Quantity]) -> Sequence[MX]:
+                stages = self._make_stages(planned, quantities)
+                columns = [self._evaluate_stages(stages, point) for point in points]
+                return [ca.horzcat(*(values[quantity] for values in columns)) for quantity in quantities]
+
+            motion = SampledMotion(evaluate, len(points))
+        else:
+            motion = self._map_instant(points, ops, phases)
+            if not ops.exact:
+                return motion
+        motion.store(self.usual, motion.evaluate(self.usual))
+        return motion
 
     def rows_over_time(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[RowsOverTime, ...]:
         """Return the phase as functions of time, after those of the durations ``begins``; nothing with finite differences."""
@@ -205,21 +195,21 @@ class Phase:
 
     def signals(self, point: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
-        histories = {name: _to_array(values) for name, values in self._evaluate_histories(point).items()}
+        histories = {quantity: _to_array(values) for quantity, values in self._evaluate_histories(point).items()}
         n = self.grid.parts + 1
         arrays = {
             "t": _to_array(point[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
             **{name: histories[quantity] for name, quantity in HISTORIES.items()},
             **{
                 f"{foot}_{half}": rows
-                for side, foot in BOTH_FEET.items()
-                for half, rows in zip(("force", "moment"), np.hsplit(histories[f"wrench_{side}"], 2), strict=True)
+                for foot, wrench in (("left", Samples.wrench_left), ("right", Samples.wrench_right))
+                for half, rows in zip(("force", "moment"), np.hsplit(histories[wrench], 2), strict=True)
             },
         }
-        if histories["attitude"].size:
-            arrays["attitude"] = histories["attitude"]
-        if histories["yaw"].size:
-            arrays["feet_yaw"] = np.column_stack([np.zeros(n), histories["yaw"]])
+        if histories[Samples.attitude].size:
+            arrays["attitude"] = histories[Samples.attitude]
+        if histories[Samples.yaw].size:
+            arrays["feet_yaw"] = np.column_stack([np.zeros(n), histories[Samples.yaw]])
         columns = COLUMNS | {name: SIMULATED[name] for name in ("attitude", "feet_yaw") if name in arrays}
         return Signals(joints=self.body.joints, arrays=arrays, columns=columns)
 
@@ -248,44 +238,59 @@ class Phase:
         return self.loads(self._exact_plan[1])
 
     @cached_property
-    def _exact_instant(self) -> ca.Function:
-        inputs, outputs = self._instant_outputs(Exact())
-        return ca.Function("sample", inputs, simplify(outputs))
+    def _exact_functions(self) -> dict[tuple[Quantity, ...], ca.Function]:
+        return {}
 
-    def _map_instant(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[Any]:
-        """Evaluate one instant at all samples, or at other phases; its open equations become rows of gradient solvers."""
-        if ops.exact:  # the judge, the proofs and the start points share it
-            return self._map(self._exact_instant, points, phases=phases)
-        inputs, outputs = self._instant_outputs(ops)
+    def _make_exact_function(self, quantities: Sequence[Quantity]) -> ca.Function:
+        """Return the function of one instant to quantities, made once: the judge, the proofs and the start points share it."""
+        key, inputs = tuple(quantities), self._exact_plan[0]
+        if key not in self._exact_functions:
+            outputs = [quantity.measure(self, self._exact_now) for quantity in quantities]
+            self._exact_functions[key] = ca.Function("sample", inputs, simplify(outputs))
+        return self._exact_functions[key]
+
+    def _map_instant(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> SampledMotion:
+        """Return one instant at all samples, or at other phases; its open equations become rows of gradient solvers."""
+        if ops.exact:
+            return SampledMotion(
+                lambda quantities: self._map(self._make_exact_function(quantities), points, phases=phases), len(points)
+            )
+        inputs, plan = self._symbolic_plan(ops)
+        now = self.loads(plan)
         roots = ops.open_roots()
-        if roots is None:
-            return self._map(ca.Function("sample", inputs, simplify(outputs)), points, phases=phases)
-        (start,) = self._map(ca.Function("start", inputs, simplify([roots.start])), points, phases=phases)
-        tied = ca.Function("sample", [roots.unknowns, *inputs], simplify([roots.residual, *outputs]))
-        columns: list[Any] = []
+        unknowns: list[MX] = []  # columns of the open equations' unknowns, if there are any
+        symbols = [] if roots is None else [roots.unknowns]
 
-        def residual(unknowns: MX) -> MX:
-            rows, *quantities = self._map(tied, points, unknowns, phases=phases)
-            columns.extend(quantities)
+        def evaluate(quantities: Sequence[Quantity], *first: SX) -> list[MX]:
+            outputs = [*first, *(quantity.measure(self, now) for quantity in quantities)]
+            return self._map(
+                ca.Function("sample", [*symbols, *inputs], simplify(outputs)), points, *unknowns, phases=phases
+            )
+
+        motion = SampledMotion(evaluate, len(points))
+        if roots is None:
+            motion.store(self.usual, evaluate(self.usual))
+            return motion
+        residual = roots.residual
+        (start,) = self._map(ca.Function("start", inputs, simplify([roots.start])), points, phases=phases)
+
+        def tie(columns: MX) -> MX:
+            unknowns.append(columns)
+            rows, *values = evaluate(self.usual, residual)
+            motion.store(self.usual, values)
             return rows
 
-        ops.tie_roots(start, residual)
-        return columns
+        ops.tie_roots(start, tie)
+        return motion
 
-    def _instant_outputs(self, ops: Nonsmooth) -> tuple[list[SX], list[SX]]:
-        """Return x, margin and phase of one instant, and its outputs for ``sample``, with analytic derivatives."""
-        inputs, plan = self._exact_plan if ops.exact else self._symbolic_plan(ops)
-        now = self._exact_now if ops.exact else self.loads(plan)
-        return inputs, [self.measure(name, now) for name in self._names_read]
-
-    def _make_stages(self, planned: tuple[list[SX], Instant], names: Sequence[str]) -> "Stages":
+    def _make_stages(self, planned: tuple[list[SX], Instant], quantities: Sequence[Quantity]) -> "Stages":
         """Return the evaluation of quantities in two stages: the motion, then the loads that it causes."""
         inputs, plan = planned
-        of_motion = [name for name in names if name in OF_MOTION or name in plan.quantities]
-        of_loads = [name for name in names if name not in {*of_motion, *ALL_JOINTS}]
+        of_motion = [quantity for quantity in quantities if quantity.of_motion]
+        of_loads = [quantity for quantity in quantities if quantity not in {*of_motion, *ALL_JOINTS}]
         world = [plan.hip, *plan.ankles.values(), plan.yaw]
-        outputs = [*_stack_motions(plan, self.body.joints), ca.vertcat(*world)]
-        outputs += [self.measure(name, plan) for name in of_motion]
+        outputs = [*(quantity.measure(self, plan) for quantity in ALL_JOINTS), ca.vertcat(*world)]
+        outputs += [quantity.measure(self, plan) for quantity in of_motion]
         motion = ca.Function("motion", inputs, outputs)
         orders = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
         given = SX.sym("world", ca.vertcat(*world).shape[0])
@@ -294,22 +299,20 @@ class Phase:
         moved = {name: Motion(*(order[i] for order in orders)) for i, name in enumerate(self.moving)}
         joints = {**self._exact_plan[1].joints, **moved}
         now = self.loads(Instant(joints=joints, hip=hip, ankles={"L": left, "R": right}, yaw=yaw))
-        loads = ca.Function("loads", [*orders, given], [self.measure(name, now) for name in of_loads])
-        return Stages(motion, loads, of_motion, of_loads, tuple(names))
+        loads = ca.Function("loads", [*orders, given], [q.measure(self, now) for q in of_loads])
+        return Stages(motion, loads, of_motion, of_loads)
 
-    def _evaluate_stages(self, stages: "Stages", point: NumericPoint) -> dict[str, MX]:
-        """Evaluate quantities at all samples, by their names; derivatives may be finite differences."""
+    def _evaluate_stages(self, stages: "Stages", point: NumericPoint) -> dict[Quantity, MX]:
+        """Evaluate quantities at all samples; derivatives may be finite differences."""
         q, qd, qdd, world, *of_motion = self._map(stages.motion, [point])
         if self.derivatives != "analytic":
             qd, qdd = self._differences(q, point)
         rows = [self.body.joints.index(name) for name in self.moving]
-        loads = stages.loads.map(self.grid.parts + 1)(q[rows, :], qd[rows, :], qdd[rows, :], world)
-        values = dict(zip(stages.of_motion, of_motion, strict=True))
-        values |= dict(zip(stages.of_loads, loads if isinstance(loads, tuple) else [loads], strict=True))
-        values |= {"all_q": q, "all_qd": qd, "all_qdd": qdd}  # see ``ALL_JOINTS``
-        return {name: values[name] for name in stages.names}
+        loads = stages.loads.map(self.grid.parts + 1).call([q[rows, :], qd[rows, :], qdd[rows, :], world])
+        values = dict(zip(stages.of_motion, of_motion, strict=True)) | dict(zip(stages.of_loads, loads, strict=True))
+        return values | dict(zip(ALL_JOINTS, (q, qd, qdd), strict=True))
 
-    def _evaluate_histories(self, point: NumericPoint) -> dict[str, MX]:
+    def _evaluate_histories(self, point: NumericPoint) -> dict[Quantity, MX]:
         return self._evaluate_stages(self._history_stages, point)
 
     @cached_property
@@ -355,58 +358,12 @@ class Phase:
 
 
 class Stages(NamedTuple):
-    """Functions of the motion and of the loads that it causes at one instant, and the names of their outputs."""
+    """Functions of the motion and of the loads that it causes at one instant, and their outputs."""
 
     motion: ca.Function
     loads: ca.Function
-    of_motion: Sequence[str]
-    of_loads: Sequence[str]
-    names: tuple[str, ...]  # of all quantities, in order
-
-
-def _locate_sole(phase: Phase, now: Instant, side: str) -> SX:
-    """Return the point (3,) of a flat sole under its ankle [m]."""
-    return now.ankles[side] - SX([0, 0, phase.body.robot.feet[BOTH_FEET[side]].ankle_height_m])
-
-
-def _locate_mass(phase: Phase, now: Instant) -> SX:
-    tree = make_tree(phase.body.robot, phase.body.robot.feet["left"].link)
-    angles = {name: joint.position for name, joint in now.joints.items()}
-    return centre_of_mass(tree, forward_kinematics(tree, angles, now.ankles["L"]))
-
-
-# Quantities of an instant by name, columns.
-QUANTITIES: dict[str, Callable[[Phase, Instant], SX]] = {
-    "planned": lambda phase, now: ca.vertcat(*(now.joints[name].position for name in phase.body.planned)),
-    "reach": lambda phase, now: now.reach,
-    "torque": lambda phase, now: ca.vertcat(*(now.torques[name] for name in phase.body.joints)),
-    "power": lambda phase, now: ca.vertcat(*(now.joints[n].velocity * now.torques[n] for n in phase.moving)),
-    "zmp": lambda phase, now: now.zmp,
-    "miss": lambda phase, now: now.miss,
-    "all_q": lambda phase, now: _stack_motions(now, phase.body.joints)[0],
-    "all_qd": lambda phase, now: _stack_motions(now, phase.body.joints)[1],
-    "all_qdd": lambda phase, now: _stack_motions(now, phase.body.joints)[2],
-    "q": lambda phase, now: _stack_motions(now, phase.moving)[0],
-    "qd": lambda phase, now: _stack_motions(now, phase.moving)[1],
-    "qdd": lambda phase, now: _stack_motions(now, phase.moving)[2],
-    "wrench_L": lambda phase, now: now.wrenches["L"],
-    "wrench_R": lambda phase, now: now.wrenches["R"],
-    "hip": lambda phase, now: now.hip,
-    "com": _locate_mass,
-    "left_foot": lambda phase, now: _locate_sole(phase, now, "L"),
-    "right_foot": lambda phase, now: _locate_sole(phase, now, "R"),
-    "swing_heights": lambda phase, now: _locate_sole(phase, now, "R")[2],  # its sole stays flat
-    "attitude": lambda phase, now: now.attitude,
-    "yaw": lambda phase, now: now.yaw,
-}
-BASE = ("planned", "reach", "torque", "power", "zmp", "miss")  # of every phase
-ALL_JOINTS = {"all_q", "all_qd", "all_qdd"}  # of time histories
-# What follows from the planned motion without its derivatives.
-OF_MOTION = {"planned", "reach", "miss", "hip", "com", "left_foot", "right_foot", "swing_heights", "attitude", "yaw"}
-
-
-def _stack_motions(plan: Instant, joints: Sequence[str]) -> list[SX]:
-    return [ca.vertcat(*(plan.joints[name][order] for name in joints)) for order in range(3)]
+    of_motion: Sequence[Quantity]
+    of_loads: Sequence[Quantity]
 
 
 def _to_array(values: Any) -> Array:

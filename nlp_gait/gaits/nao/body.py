@@ -12,7 +12,7 @@ from nlp_gait.formulation import InstantPoint, Point
 from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, Support, ZmpGravity, ZmpMasses
 from nlp_gait.gaits.biped.footholds import Foothold
-from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndIndexes, make_rows
+from nlp_gait.gaits.biped.limits import ArmLimits, Limit, Margins, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.nao import joints as nao_joints
@@ -171,7 +171,7 @@ class NaoBody(Body):
             hip=hip.position,
             ankles=places,
             reach=vertcat(*reach),
-            quantities={"arm_angle": vertcat(*(motion.position for motion in angles.values()))},
+            arm_angle=vertcat(*(motion.position for motion in angles.values())),
         )
 
     def make_sole_margins(self, support_xy: tuple[float, float]) -> Margins:
@@ -203,7 +203,7 @@ class NaoBody(Body):
 
     def make_curve_limits(self, phase: Support, count: int) -> tuple[Limit, ...]:
         """Return the limits of the arms' joints that swing."""
-        return (AngleLimits("arm_angle", self.robot, tuple(ARM_SWING[phase])),) if count else ()
+        return (ArmLimits(self.robot, tuple(ARM_SWING[phase])),) if count else ()
 
 
 def make_nao(

@@ -41,7 +41,7 @@ class HipLimits(Limit):
         self.parameters = make_bound_parameters(tuple(unique.values()))
 
     def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        hip, rate = samples.read("hip"), samples.read("hip_rate")
+        hip, rate = samples.hip, samples.hip_rate
         rows = []
         for end, limits, label in zip((0, hip.shape[1] - 1), self._variables, self._labels, strict=False):
             values = {axis: hip[k, end] for k, axis in enumerate("xyz")}
@@ -65,7 +65,7 @@ class SwingLimits(Limit):
         self._inner_edge = motion.body.support[1] - motion.body.robot.feet["left"].right_m
 
     def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        heights, sides, tolerance = samples.swing_heights, samples.read("sides"), point[GROUND_TOLERANCE.name]
+        heights, sides, tolerance = samples.swing_heights, samples.sides, point[GROUND_TOLERANCE.name]
         inside = range(1, samples.steps)
         # Of the whole motion, not of the samples alone.
         highest = MX(float(self._motion.right_foot(np.linspace(0.0, self._motion.duration_s, FINE))[:, 2].max()))
@@ -90,7 +90,7 @@ class StandingLimits(Limit):
     def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         heights, ground, tolerance = (
             samples.swing_heights,
-            samples.read("right_foot")[:2, :],
+            samples.right_foot[:2, :],
             point[GROUND_TOLERANCE.name],
         )
         n = samples.steps + 1

@@ -12,7 +12,7 @@ from casadi import DM, MX, SX
 from nlp_gait.formulation import NumericPoint, Point, Signals
 from nlp_gait.formulation.assembly import Parameter, RowsOverTime
 from nlp_gait.gaits.biped.phase import IN_TIME, Phase
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Planner
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Planner, Quantity, SampledMotion
 from nlp_gait.gaits.nao.joints import KNEES
 from nlp_gait.gaits.nao.recorded_motion import RecordedMotion, locate_free_parts
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -32,11 +32,7 @@ GROUND_TOLERANCE = Parameter(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedPhase(Phase):
-    """A phase whose angles over time are given, stretched to its duration.
-
-    Quantities besides those of all phases: ``hip_rate`` (3, N + 1) [m/s]; ``along`` (1, N + 1), x of the right ankle; ``sides``
-    (2, N + 1), y of the right sole's left corners; ``swing_heights`` are those of its four corners (4, N + 1) [m].
-    """
+    """A phase whose angles over time are given, stretched to its duration; its soles may tilt."""
 
     recorded: RecordedMotion  # the motion, of the body's joints
     plan: Planner = field(init=False)
@@ -57,39 +53,31 @@ class RecordedPhase(Phase):
         joints = {name: Motion(v[i], v[count + i], v[2 * count + i]) for i, name in enumerate(self.body.joints)}
         instant = self.loads(place_on_left_foot(self, joints))
         hip_rate = ca.jtimes(instant.hip, v[:count], v[count : 2 * count])
-        return instant._replace(quantities={**instant.quantities, "hip_rate": hip_rate})
+        return instant._replace(hip_rate=hip_rate)
 
-    def _evaluate(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[dict[str, Any]]:
-        return [self._evaluate_names(self._names_read, point) for point in points]
+    def _evaluate(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> SampledMotion:
+        def evaluate(quantities: Sequence[Quantity]) -> Sequence[MX]:
+            columns = [self._evaluate_quantities(quantities, point) for point in points]
+            return [ca.horzcat(*(values[quantity] for values in columns)) for quantity in quantities]
 
-    def _evaluate_histories(self, point: NumericPoint) -> dict[str, Any]:
-        return self._evaluate_names(IN_TIME, point)
+        motion = SampledMotion(evaluate, len(points))
+        motion.store(self.usual, evaluate(self.usual))
+        return motion
 
-    def _evaluate_names(self, names: Sequence[str], point: Any) -> dict[str, Any]:
-        """Return quantities by name: of single joints from the recording, all others by one function of these."""
+    def _evaluate_histories(self, point: NumericPoint) -> dict[Quantity, Any]:
+        return self._evaluate_quantities(IN_TIME, point)
+
+    def _evaluate_quantities(self, quantities: Sequence[Quantity], point: Any) -> dict[Quantity, Any]:
+        """Return quantities: of single joints from the recording, all others by one function of these."""
         times = np.linspace(0.0, self.recorded.duration_s, self.grid.parts + 1)
         speed = self.recorded.duration_s / ca.fmax(point[self.duration], LEAST_DURATION)
         angles, rates, accelerations = (DM(self.recorded.spline(times, order).T) for order in range(3))
         motions = ca.vertcat(angles, rates * speed, accelerations * speed**2)
-        q, qd, qdd = ca.vertsplit(motions, len(self.body.joints))
-        joints = self.body.joints
-        rows = {keys: [joints.index(name) for name in keys] for keys in (self.body.planned, KNEES, self.moving)}
-        moving = rows[self.moving]
-        values: dict[str, Any] = {
-            "planned": q[rows[self.body.planned], :],
-            "reach": ca.cos(q[rows[KNEES], :]),
-            "miss": q[:0, :],
-            **{key: value[moving, :] for key, value in (("q", q), ("qd", qd), ("qdd", qdd))},
-            **{"all_q": q, "all_qd": qd, "all_qdd": qdd},
-        }
-        mapped = [name for name in names if name not in {*values, "power"}]
-        outputs = [self.measure(name, self._exact_now) for name in mapped]
+        outputs = [quantity.measure(self, self._exact_now) for quantity in quantities]
         if isinstance(motions, MX):  # a function that is evaluated once is not worth it
             outputs = simplify(outputs)
         columns = ca.Function("instant", [self._joint_symbols], outputs).map(len(times)).call([motions])
-        values |= dict(zip(mapped, columns, strict=True))
-        values["power"] = qd[moving, :] * values["torque"][moving, :]
-        return {name: values[name] for name in names}
+        return dict(zip(quantities, columns, strict=True))
 
     def rows_over_time(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[RowsOverTime, ...]:
         """Return nothing: a recording says nothing about the time between its samples."""
@@ -112,9 +100,6 @@ def place_on_left_foot(phase: Phase, joints: Mapping[str, Motion]) -> Instant:
         hip=places.torso,
         ankles={"L": SX(DM(body.support)), "R": places.ankle},
         reach=ca.vertcat(*(ca.cos(joints[knee].position) for knee in KNEES)),
-        quantities={
-            "along": places.ankle[0],
-            "swing_heights": places.corners[2, :].T,
-            "sides": places.corners[1, 1::2].T,
-        },
+        heights=places.corners[2, :].T,
+        sides=places.corners[1, 1::2].T,
     )
