@@ -39,6 +39,7 @@ class ExactModel:
 
     function: ca.Function  #: (x, p) to the parts of ``ExactValues``, in their order
     row_names: tuple[str, ...]  #: (m,) names of the constraint rows; the last n are the variables' bounds
+    row_groups: tuple[str, ...]  #: (m,) names of the constraints to which they belong, ``bounds`` for the variables
     row_units: tuple[str, ...]  #: (m,)
     row_scales: Array  #: (m,) scales of the violations [unit of the row]
     index_names: tuple[str, ...]
@@ -138,12 +139,18 @@ def _build(problem: GaitProblem) -> ExactModel:
     )
     names = [name for c in constraints for name in c.row_names]
     units = [c.unit for c in constraints for _ in c.row_names]
+    groups = [c.name for c in constraints for _ in c.row_names] + ["bounds"] * len(problem.names)
     names += [f"bounds[{name}]" for name in problem.names]
     units += [variable.unit for variable in problem.variables]
     scales = np.array(ca.evalf(scale)).ravel()
     indexes = tuple(assembly.indexes)
     model = ExactModel(
-        function=function, row_names=tuple(names), row_units=tuple(units), row_scales=scales, index_names=indexes
+        function=function,
+        row_names=tuple(names),
+        row_groups=tuple(groups),
+        row_units=tuple(units),
+        row_scales=scales,
+        index_names=indexes,
     )
     _check_change(problem, model)
     return model

@@ -32,6 +32,7 @@ class OneSidedRows:
         self.sign = np.where(side == 1, 1.0, -1.0)  # (m,) +1 for an upper bound
         self.bound = both[self.row, side]  # (m,) [unit of the row]
         self.weight = kernel.weights[self.row]  # (m,) 1 / scale
+        self.groups = tuple(kernel.model.row_groups[r] for r in self.row)  # (m,) names of the constraints
         words = (">= lower", "<= upper")
         # (m,) for example ``torque_change[LKneePitch, 3] <= upper``
         self.names = tuple(f"{kernel.model.row_names[r]} {words[s]}" for r, s in zip(self.row, side, strict=True))

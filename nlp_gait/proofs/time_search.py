@@ -73,7 +73,7 @@ class TimeRows:
         self, plain: Sequence[tuple[Any, ...]], averaged: Sequence[tuple[Any, ...]], inputs: Sequence[MX], kinks: bool
     ) -> None:
         """Read the instructions of a function of (x, p, phase) or (x, p, phase, phase an interval later)."""
-        names, units, values, lower, upper = zip(*plain, *averaged, strict=True)
+        constraints, names, units, values, lower, upper = zip(*plain, *averaged, strict=True)
         self.names, self.units, self.plain = names, units, len(plain)  # no unit: an index, which has no bounds
         self._bounds = ca.Function("bounds", [inputs[1]], [ca.vertcat(*lower), ca.vertcat(*upper)])
         function = ca.Function("rows", list(inputs), [ca.vertcat(*values)])
@@ -83,8 +83,8 @@ class TimeRows:
         self._half_open = range(first, first + len(inputs) - 2) if kinks else ()
         self.whole = AffineFunction(self._function, self._half_open)
         groups: dict[str, list[int]] = defaultdict(list)
-        for k, (name, *_) in enumerate(plain):
-            groups[name.partition("[")[0]].append(k)
+        for k, constraint in enumerate(constraints[: len(plain)]):
+            groups[constraint].append(k)
         self.groups = [np.array(group) for group in groups.values()]  # indices of the rows with one name
         self._parts: dict[int, EnclosedPart] = {}
 
@@ -134,12 +134,12 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
     instants = [row for constraint in by_kind["instant"] for row in _select_first_sample(constraint)]
     means = [row for c in by_kind["mean"] for row in _split(c)]
     squares = [
-        (name, unit, value**2, lower, upper)
+        (*names, value**2, lower, upper)
         for c in by_kind["root-mean-square"]
-        for name, unit, value, lower, upper in _split(c)
+        for *names, value, lower, upper in _split(c)
     ]
     means_of = [name for name in source.means if name in still.indexes]
-    indexes = [(name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in means_of]
+    indexes = [(name, name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in means_of]
     averaged, kinks = [*means, *squares, *indexes], bool(source.kinks)
     first = len(instants) + len(means)
     changes = [row for c in moved.constraints if c.name in wanted for row in _select_first_sample(c)]
@@ -152,18 +152,20 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
 
 
 def _split(constraint: Constraint) -> list[tuple[Any, ...]]:
+    """Return the name of the constraint, name, unit, value, lower and upper bound of each row."""
     columns = [ca.vertsplit(column) for column in constraint.columns]
-    return [(name, constraint.unit, *row) for name, *row in zip(constraint.row_names, *columns, strict=True)]
+    rows = zip(constraint.row_names, *columns, strict=True)
+    return [(constraint.name, name, constraint.unit, *row) for name, *row in rows]
 
 
 def _select_first_sample(constraint: Constraint) -> list[tuple[Any, ...]]:
     """Return the same for the first sample, named without its number."""
     rows: dict[str, tuple[Any, ...]] = {}
     labels = constraint.labels or ("",)
-    for label, (_, *row) in zip(labels, _split(constraint), strict=True):
+    for label, (_, _, *row) in zip(labels, _split(constraint), strict=True):
         stem = label.rpartition(",")[0]
         rows.setdefault(f"{constraint.name}[{stem}]" if stem else constraint.name, tuple(row))
-    return [(name, *row) for name, row in rows.items()]
+    return [(constraint.name, name, *row) for name, row in rows.items()]
 
 
 class TimeSearch:

@@ -181,7 +181,7 @@ class CompiledObjective:
         self._evaluate_rows = evaluate_rows
         self._shared = (np.array(problem.p), *kernel.row_bounds(problem), kernel.weights)
         #: (m - n,) names of the rows without their places, those of the variables left out
-        self.groups = tuple(name.partition("[")[0] for name in self.row_names[: -len(self.names)])
+        self.groups = kernel.model.row_groups[: -len(self.names)]
         self._threads = RowThreads(threads)
         self._rebuild = rebuild
         self._local = threading.local()

@@ -34,7 +34,7 @@ def to_scipy(instance: Instance) -> dict[str, Any]:
 
 def to_cma(instance: Instance) -> dict[str, Any]:
     """Return arguments of ``cma.fmin_con2``."""
-    groups = [name.partition("[")[0].split(" ")[0] for name in instance.row_names]
+    groups = instance.sides.groups
     first = np.array([k for k, group in enumerate(groups) if k == 0 or group != groups[k - 1]])
 
     def worst_of_groups(x: Any) -> list[float]:

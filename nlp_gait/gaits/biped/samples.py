@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, overload
 
 import casadi as ca
 from casadi import DM, MX, SX
@@ -13,9 +13,6 @@ from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
-
-if TYPE_CHECKING:
-    from nlp_gait.gaits.biped.phase import Phase
 
 BOTH_FEET = {"L": "left", "R": "right"}
 LEAST_DURATION = 1e-3  # [s]; a shorter phase is evaluated as this one, so that rates stay finite
@@ -49,8 +46,8 @@ Loader: TypeAlias = Callable[[Instant], Instant]  # adds torques, ZMP and the gr
 class Quantity:
     """A quantity of one instant; as an attribute of samples, it is evaluated at all of them when it is first read."""
 
-    def __init__(self, measure: Callable[["Phase", Instant], SX], *, of_motion: bool = False) -> None:
-        self.measure = measure  #: (k,) from a phase and an instant of it
+    def __init__(self, measure: Callable[[Any, Instant], SX], *, of_motion: bool = False) -> None:
+        self.measure = measure  #: (k,) from a ``Phase`` and an instant of it
         self.of_motion = of_motion  #: whether it follows from the planned motion without derivatives and loads
 
     @overload
@@ -65,12 +62,12 @@ def _stack(now: Instant, joints: Sequence[str], order: int) -> SX:
     return ca.vertcat(*(now.joints[name][order] for name in joints))
 
 
-def _locate_sole(phase: "Phase", now: Instant, side: str) -> SX:
+def _locate_sole(phase: Any, now: Instant, side: str) -> SX:
     """Return the point (3,) of a flat sole under its ankle [m]."""
     return now.ankles[side] - SX([0, 0, phase.body.robot.feet[BOTH_FEET[side]].ankle_height_m])
 
 
-def _locate_mass(phase: "Phase", now: Instant) -> SX:
+def _locate_mass(phase: Any, now: Instant) -> SX:
     tree = make_tree(phase.body.robot, phase.body.robot.feet["left"].link)
     angles = {name: joint.position for name, joint in now.joints.items()}
     return centre_of_mass(tree, forward_kinematics(tree, angles, now.ankles["L"]))
