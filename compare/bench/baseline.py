@@ -18,7 +18,7 @@ from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import GRADIENT_SOLVERS, Handling, Inputs, ProblemSpec, Stop
 from nlp_gait import gaitbench
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, format_value
 from nlp_gait.gaitbench.facts import Subset
 from nlp_gait.gaitbench.generated import is_generated, make_id
 
@@ -53,12 +53,13 @@ def choose_instances(
 def parse_seeds(text: str) -> tuple[int, ...]:
     """Return the seeds of ``0:15`` (15 is not among them) or ``3,5,8``; raises InputError."""
     match = SEEDS.fullmatch(text)
-    seeds = tuple(range(int(match[1]), int(match[2]))) if match else ()
-    if not match and all(word.strip().isdecimal() for word in text.split(",")):
-        seeds = tuple(int(word) for word in text.split(","))
+    words = text.split(",")
+    seeds: Sequence[int] = range(int(match[1]), int(match[2])) if match else ()
+    if not match and len(words) <= MOST_SEEDS and all(word.strip().isdecimal() for word in words):
+        seeds = tuple(map(int, words))
     if not 0 < len(seeds) <= MOST_SEEDS:
-        raise InputError(f"--seeds takes FIRST:END or numbers with commas, at most {MOST_SEEDS}, got {text!r}")
-    return seeds
+        raise InputError(f"--seeds takes FIRST:END or numbers with commas, at most {MOST_SEEDS}, got {format_value(text)}")
+    return tuple(seeds)
 
 
 def make_bench_study(

@@ -149,11 +149,11 @@ def test_a_name_that_is_not_text_is_refused_before_the_work(arguments: str, tmp_
 
 @pytest.mark.slow
 def test_no_room_for_temporary_files_is_one_sentence(tmp_path: Path) -> None:
-    inside = Path(sys.executable).is_relative_to(ROOT)
-    program = Path("/media") / Path(sys.executable).relative_to(ROOT) if inside else sys.executable
+    program = Path("/srv") / Path(sys.executable).relative_to(sys.prefix)
     fill = 'mount -t tmpfs -o size=4k none "$place"; head -c 4096 /dev/zero > "$place/x"; '
     script = (
-        'mkdir "$2/cache"; mount --bind "$2/cache" /mnt; mount --bind "$PWD" /media; '  # which may lie in /tmp
+        'mkdir "$2/cache"; mount --bind "$2/cache" /mnt; mount --bind "$PWD" /media; '  # all of which may lie in /tmp
+        f'mount --bind "{sys.prefix}" /srv; '
         f"for place in /tmp /var/tmp /dev/shm; do {fill} done; [ ! -d /usr/tmp ] || {{ place=/usr/tmp; {fill} }}; "
         "export TMPDIR=/tmp XDG_CACHE_HOME=/mnt PYTHONPATH=/media; cd /dev/shm; "
         f'"{program}" -P -m nlp_gait solve walk12 --starts 1'
