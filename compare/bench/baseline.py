@@ -58,7 +58,9 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     if not match and len(words) <= MOST_SEEDS and all(word.strip().isdecimal() for word in words):
         seeds = tuple(map(int, words))
     if not 0 < len(seeds) <= MOST_SEEDS:
-        raise InputError(f"--seeds takes FIRST:END or numbers with commas, at most {MOST_SEEDS}, got {format_value(text)}")
+        raise InputError(
+            f"--seeds takes FIRST:END or numbers with commas, at most {MOST_SEEDS}, got {format_value(text)}"
+        )
     return tuple(seeds)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,12 +22,14 @@ from nlp_gait.export.formats import write_npz
 from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.files import format_csv, write_text
 from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.robots import load_robot
 
 if TYPE_CHECKING:
     from compare.questions.recorded import JudgedGait
 
 SHOWN_VIOLATIONS = 10
+USUAL_TOLERANCE = 1e-4  # of equations in the competitions of evolutionary computation
 X = "Decision variables in order, separated by commas; or a .csv file with one candidate per row."
 ROUNDED = "Judge all points that round to the digits of --x, not that point alone."
 CLAIMED = "With --rounded: the objective as printed; can a point have it?"
@@ -152,8 +154,8 @@ def _describe_gait(judged: JudgedGait) -> Iterator[str | Rows]:
 
 
 def _tabulate(judged: Sequence[Evaluation]) -> Rows:
-    objective = judged[0].objective
-    columns = {
+    objective, over_time = judged[0].objective, any(evaluation.dense is not None for evaluation in judged)
+    columns: dict[str, Callable[[tuple[int, Evaluation]], str]] = {
         "row": lambda item: str(item[0]),
         make_heading(objective["name"], objective["unit"]): lambda item: f"{item[1].objective['value']:.6g}",
         "violation": lambda item: f"{item[1].violation:.3g}",
@@ -164,6 +166,8 @@ def _tabulate(judged: Sequence[Evaluation]) -> Rows:
             (row.name for row in (*item[1].violations, *item[1].dense_violations)), "-"
         ),
     }
+    if not over_time:
+        del columns["between samples"], columns["guaranteed"]
     return tabulate(f"{judged[0].problem}: {len(judged)} candidates", enumerate(judged, start=1), columns)
 
 
@@ -180,27 +184,27 @@ def _list_cells(judged: Sequence[Evaluation]) -> Iterator[Sequence[object]]:
 
 
 def _describe(evaluation: Evaluation) -> Iterator[str | Rows]:
-    objective, dense, guaranteed = evaluation.objective, evaluation.dense or {}, evaluation.guaranteed
+    objective, dense, guaranteed = evaluation.objective, evaluation.dense, evaluation.guaranteed
     yield f"{evaluation.problem}: {objective['name']} {with_unit(objective['value'], objective['unit'])}"
     means = {} if guaranteed is None else guaranteed.means
-    columns = {
-        "index": lambda index: index[0],
-        "samples": lambda index: f"{index[1]:z.6f}",
-        f"{evaluation.dense_intervals} intervals" if dense else "no dense grid": lambda index: with_unit(
-            dense.get(index[0]), "1"
-        ),
-        "proven over time": lambda index: "{:.6f} to {:.6f}".format(*means[index[0]]) if index[0] in means else "-",
-    }
-    if not means:
-        del columns["proven over time"]
-    yield tabulate("Indexes", evaluation.indexes.items(), columns)
+    columns: dict[str, Callable[[tuple[str, float]], str]] = {"index": lambda index: index[0]}
+    columns["value" if dense is None else "samples"] = lambda index: f"{index[1]:z.6f}"
+    if dense is not None:
+        columns[f"{evaluation.dense_intervals} intervals"] = lambda index: with_unit(dense.get(index[0]), "1")
+    if means:
+        columns["proven over time"] = lambda index: (
+            "{:.6f} to {:.6f}".format(*means[index[0]]) if index[0] in means else "-"
+        )
+    if evaluation.indexes:
+        yield tabulate("Indexes", evaluation.indexes.items(), columns)
     yield from _describe_violations(evaluation)
-    if guaranteed is not None:
+    if guaranteed is not None and dense is not None:
         yield f"Guaranteed: {guaranteed}"
 
 
 def _describe_violations(evaluation: Evaluation) -> Iterator[str | Rows]:
     for title, violated in (("samples", evaluation.violations), ("dense grid", evaluation.dense_violations)):
+        place = "" if evaluation.dense is None else f" on the {title}"
         columns = {
             "constraint": lambda v: v.name,
             "value": lambda v: f"{v.value:.6g}",
@@ -209,7 +213,12 @@ def _describe_violations(evaluation: Evaluation) -> Iterator[str | Rows]:
             "violation": lambda v: with_unit(v.violation, v.unit, ".3g"),
         }
         if violated:
-            heading = f"Infeasible on the {title}: {len(violated)} violated constraints, worst first"
+            heading = f"Infeasible{place}: {len(violated)} violated, worst first"
             yield tabulate(heading, violated[:SHOWN_VIOLATIONS], columns)
-        elif title == "samples" or evaluation.dense:
-            yield f"feasible on the {title}"
+        elif title == "samples" or evaluation.dense is not None:
+            yield f"feasible{place}"
+    if any(row.lower == row.upper and row.violation <= USUAL_TOLERANCE for row in evaluation.violations):
+        yield (
+            f"An equation is satisfied within {USUAL_TOLERANCE:g}, which is often allowed elsewhere; here the violations over "
+            f"their scales may sum up to {FEASIBILITY_TOLERANCE:g}: give the point with more digits"
+        )
