@@ -38,8 +38,7 @@ suppress_warnings = ["config.cache"]  # the gallery's configuration holds functi
 nitpicky = False
 default_role = "code"
 
-myst_enable_extensions = ["colon_fence", "dollarmath", "fieldlist", "substitution"]
-myst_substitutions = numbers.list_substitutions()
+myst_enable_extensions = ["colon_fence", "dollarmath", "fieldlist"]
 myst_dmath_double_inline = False
 html_math_renderer = "mathml"
 myst_heading_anchors = 4

@@ -1,8 +1,9 @@
-"""Measured numbers of the documentation: ``docs/numbers.toml``, which pages name instead of repeating it.
+"""Measured numbers of the documentation: ``docs/numbers.toml``.
 
-``{{ name }}`` in a page becomes a number with its unit; each table is a file that a page includes. A benchmark prints its table
-as Markdown, and this module replaces the recorded one by it:
+Pages state these numbers, and a test compares them; each table is a file that a page includes. A benchmark prints its table as
+Markdown, and this module replaces the recorded one by it:
 
+    python -m docs.pages.numbers    # prints all numbers and the commands that measure them
     python -m benchmarks.engine speeds | python -m docs.pages.numbers engine-speeds
 """
 
@@ -32,7 +33,7 @@ def read_numbers() -> dict[str, Any]:
     return tomllib.loads(FILE.read_text(encoding="utf-8"))
 
 
-def list_substitutions() -> dict[str, str]:
+def list_values() -> dict[str, str]:
     """Return the text of each number, with its unit."""
     return {name: f"{entry['value']} {entry['unit']}".strip() for name, entry in read_numbers()["number"].items()}
 
@@ -70,8 +71,14 @@ def _format_list(values: list[Any]) -> str:
 
 
 def main() -> None:
-    """Replace a table by the one on standard input."""
-    numbers, name = read_numbers(), sys.argv[1]
+    """Print all numbers, or replace a table by the one on standard input."""
+    numbers = read_numbers()
+    if len(sys.argv) == 1:
+        for name, value in list_values().items():
+            entry = numbers["number"][name]
+            print(f"{value}: {entry['what']} ({entry['command']}, {entry['date']})")
+        return
+    name = sys.argv[1]
     columns, rows = parse_table(sys.stdin)
     commit = subprocess.run(
         ["git", "rev-parse", "--short=8", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True

@@ -82,3 +82,34 @@ def test_solve_takes_any_nlp_solver_by_name(tmp_path):
     written = json.loads(out.read_text())
     assert "; slsqp\n" in shown and written["solver"] == "slsqp" and written["linear_solver"] == ""
     assert written["claimed"] and written["active_constraints"] == []
+
+
+BEAM = """
+from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Objective, Variable, maker
+
+
+@maker
+def beam() -> GaitProblem:
+    def assemble(at, ops):
+        row = Constraint(name="area", unit="in^2", scale=1.0, value=at["h"] * at["l"], lower=0.5, upper=0.5)
+        return Assembly(objective=at["h"] + at["l"], constraints=(row,), indexes={})
+
+    names = [Variable(name=name, unit="in", lower=0.1, upper=2.0, description=name) for name in "hl"]
+    return GaitProblem(
+        name="beam", title="beam", variables=tuple(names), objective=Objective(name="cost", unit="USD"), assemble=assemble
+    )
+"""
+
+
+def test_a_problem_without_a_gait_is_evaluated_in_its_own_words(tmp_path):
+    (tmp_path / "beam.py").write_text(BEAM)
+    (tmp_path / "points.csv").write_text("h;l\n0,5;1,0\n0,4;1,2\n", encoding="utf-8-sig")
+    beam = f"{tmp_path / 'beam.py'}:beam"
+    exact, near, table = (
+        nlp_gait("evaluate", beam, "--x", x).stdout for x in ("0.5,1", "0.5,1.00005", tmp_path / "points.csv")
+    )
+    assert exact.splitlines()[0].endswith("beam: cost 1.500000 USD") and exact.splitlines()[-1] == "feasible"
+    assert "An equation is satisfied within 0.0001, which is often allowed elsewhere" in " ".join(near.split())
+    assert "0.02" in table and "no" in table.split()
+    for text in (exact, near, table):
+        assert not {"guaranteed", "Guaranteed:", "samples", "dense"} & set(text.split())
