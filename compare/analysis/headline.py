@@ -121,7 +121,7 @@ def _describe_away(comparison: Comparison, away: Sequence[tuple[SolverRuns, floa
     for solver, gap in others:
         word = f"{solver.title} {comparison.format_gap(abs(gap))}"
         same = comparison.compare_with_others(before.name).get(solver.name) == 0
-        words.append(f"{word} (order uncertain)" if same and not comparison.power else word)
+        words.append(f"{word} (order uncertain)" if same else word)
         before = solver
     return ", ".join(words)
 
@@ -135,10 +135,7 @@ def _describe_reaching(comparison: Comparison, solver_and_first: tuple[SolverRun
     else:
         count = f"{reached} of {runs}" if reached < runs else "both" if runs == 2 else f"all {runs}"
         how = f"{'from' if solver.is_gradient else 'in'} {count} {noun}s"
-    time = median(record.time_s.solve for record in solver.records)
-    seconds = f"{time:.0f}" if time >= 10.0 else f"{time:.1g}"
-    shown = f" (median {seconds} s)" if is_first and solver.is_gradient and math.isfinite(time) and runs > 1 else ""
-    return f"{solver.title} {f'reaches {best} ' if is_first else ''}{how}{shown}"
+    return f"{solver.title} {f'reaches {best} ' if is_first else ''}{how}"
 
 
 def _describe_failing(solver: SolverRuns) -> str:
@@ -152,7 +149,7 @@ def _describe_failing(solver: SolverRuns) -> str:
 
 
 def _write_second(comparison: Comparison) -> str:
-    """Return the sentence that matters most besides the first one: a new best value, the user's solver, or too few runs."""
+    """Return what else matters: a new best value, or from which solvers the user's differs."""
     if comparison.better is not None:
         return describe_better(comparison)
     for solver in comparison.solvers:
@@ -164,7 +161,7 @@ def _write_second(comparison: Comparison) -> str:
         ]
         if places and not comparison.power:
             return f"By rank-sum tests {solver.title} is {join_words(places)}."
-    return "There are too few runs for tests of the order." if comparison.power else ""
+    return ""
 
 
 def describe_better(comparison: Comparison) -> str:

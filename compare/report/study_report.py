@@ -84,7 +84,7 @@ def make_study_document(
     problems = {comparison.problem: load_problem_or_none(comparison) for comparison in comparisons}
     titles = {comparison.problem: split_title(comparison, problems[comparison.problem]) for comparison in comparisons}
     return Document(
-        title=_write_title(list(titles.values())),
+        title=_write_title(list(titles.values()), len({solver.name for c in comparisons for solver in c.solvers})),
         parts=(
             *_describe_latest(manifest.sessions),
             *_describe_progress(manifest, [r for c in comparisons for r in c.records], len(excluded)),
@@ -107,13 +107,13 @@ def make_study_document(
     )
 
 
-def _write_title(titles: Sequence[tuple[str, str]]) -> str:
+def _write_title(titles: Sequence[tuple[str, str]], solvers: int) -> str:
     """Return the task and the objective, or what several problems have in common."""
-    goals = dict.fromkeys(goal for _, goal in titles)
+    goals = {goal for _, goal in titles}
     if len(titles) == 1:
         return ": ".join(titles[0])
-    goal = "".join(goals) if len(goals) == 1 else f"{len(titles)} problems"
-    return f"{goal[:1].upper()}{goal[1:]}"
+    goal = goals.pop()
+    return f"{solvers} solvers on {len(titles)} problems" if goals else f"{goal[:1].upper()}{goal[1:]}"
 
 
 def _describe_latest(sessions: Sequence[Session]) -> tuple[str, ...]:

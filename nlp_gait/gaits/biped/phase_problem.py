@@ -105,7 +105,7 @@ def make_gait_problem(
     )
     return GaitProblem(
         name=f"{body.family}-{name}",
-        title=f"{body.title}, {title}",
+        title=f"{body.title} {title}",
         variables=gait.decisions,
         own_parameters=gait.parameters,
         objective=gait.objective,

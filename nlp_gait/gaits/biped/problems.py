@@ -116,8 +116,9 @@ def make_support_problem(
 ) -> GaitProblem:
     """Return the problem of single support, or of double support with its loads."""
     step_m, goal = body.check_step_length(options.step_length_m), make_goal(body, options.objective)
-    kind, words = (Support.SINGLE, "single") if loads is None else (Support.DOUBLE, "double")
+    kind, legs = (Support.SINGLE, "one leg") if loads is None else (Support.DOUBLE, "two legs")
+    minimised = "mean motor power" if options.objective == "power" else goal.objective.name.replace("_", " ")
     loader = None if loads is None else make_divided_loads(body, loads.torso_share)
     grid = options.make_grid(options.trajectory)
     phase = make_support_phase(body, kind, step_m, options.trajectory, grid, goal, loader, derivatives)
-    return make_phase_problem(kind, f"{words} support: least mean power", phase)
+    return make_phase_problem(kind, f"on {legs}: {minimised}", phase)

@@ -29,7 +29,7 @@ def test_the_shipped_list_is_that_of_the_code() -> None:
 
 def test_the_list_names_problems_algorithms_and_robots() -> None:
     text = nlp_gait("list").stdout
-    assert "NAO, single support: least mean power" in text and "pymoo:" in text and "nao-v5" in text
+    assert "NAO on one leg: mean motor power" in text and "pymoo:" in text and "nao-v5" in text
     assert as_json("list")["problems"]["nao-ssp"]["variables"] == 9
 
 
