@@ -19,8 +19,8 @@ import numpy as np
 
 import nlp_gait
 from compare.study.record import RunRecord
-from compare.study.run_study import Study, run_study
-from compare.study.task import IPOPT, ProblemSpec, Task
+from compare.study.run import IPOPT, ProblemSpec, Run
+from compare.study.study import Study, run_study
 from nlp_gait.decoding import decode
 from nlp_gait.files import read_json, write_json
 from nlp_gait.formulation import GaitProblem
@@ -120,8 +120,8 @@ def measured(name: str, folder: Path, starts: int, runs: int, jobs: int) -> Diff
     spec = ProblemSpec(name=name)
     problem = spec.load()
     counts = {IPOPT: starts, **(dict.fromkeys(SEARCHES, runs) if problem.searchable else {})}
-    tasks = [Task(problem=spec, solver=solver, run=run) for solver, n in counts.items() for run in range(n)]
-    records = run_study(Study(tasks=tuple(tasks), folder=folder, jobs=jobs))
+    tasks = [Run(problem=spec, solver=solver, number=run) for solver, n in counts.items() for run in range(n)]
+    records = run_study(Study(runs=tuple(tasks), folder=folder, jobs=jobs))
     points, feasible, us = random_points(problem) if problem.searchable else (0, 0, None)
     return Difficulty(
         best=best_of(records),
@@ -136,7 +136,7 @@ def measured(name: str, folder: Path, starts: int, runs: int, jobs: int) -> Diff
 def cost_of(record: RunRecord) -> float:
     """Objective as it is minimised, infinite where the judge finds the point infeasible."""
     sign = record.inputs.objective.sign
-    return sign * record.verdict.objective if record.verdict.feasible else math.inf
+    return sign * record.objective if record.feasible else math.inf
 
 
 def gap(cost: float, best: float) -> float:
@@ -151,7 +151,7 @@ def best_of(records: Sequence[RunRecord]) -> Best | None:
         return None
     priced = [r for r in records if r.active_constraints and gap(cost_of(r), cost_of(best)) < 1e-6]
     prices = min(priced, key=cost_of).active_constraints if priced else ()
-    return Best(solver=best.solver, objective=best.verdict.objective, x=best.x, active_constraints=prices)
+    return Best(solver=best.solver, objective=best.objective, x=best.x, active_constraints=prices)
 
 
 def reached(records: Sequence[RunRecord]) -> dict[str, Reached]:

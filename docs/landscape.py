@@ -206,9 +206,9 @@ def collect_dimensions() -> list[dict[str, Any]]:
         instance = gaitbench.load(id)
         costs: dict[str, list[float]] = {}
         for record in load_baseline(id):
-            cost = instance.gait_problem.objective.sign * record.verdict.objective
+            cost = instance.gait_problem.objective.sign * record.objective
             gap = max(cost - instance.best_known, 0.0) / abs(instance.best_known)
-            costs.setdefault(record.solver, []).append(gap if record.verdict.feasible else np.inf)
+            costs.setdefault(record.solver, []).append(gap if record.feasible else np.inf)
         rows.append({"id": id, "n": len(instance.names), **{s: statistics.median(v) for s, v in costs.items()}})
     return rows
 

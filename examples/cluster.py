@@ -16,11 +16,11 @@ from compare.analysis.columns import summarise
 from compare.analysis.comparison import compare_problems
 from compare.drawing.charts import plot_charts
 from compare.drawing.comparison_figures import make_final_gap_charts
-from compare.study.run_study import Study, run_study
-from compare.study.task import ProblemSpec, Task
+from compare.study.run import ProblemSpec, Run
+from compare.study.study import Study, run_study
 
 tasks = [
-    Task(problem=ProblemSpec(name="nao-dsp"), solver=algorithm, run=run)
+    Run(problem=ProblemSpec(name="nao-dsp"), solver=algorithm, number=run)
     for algorithm in ("ipopt", "pso", "ga")
     for run in range(4)
 ]
@@ -30,7 +30,7 @@ tasks = [
 
 if __name__ == "__main__":
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        study = Study(tasks=tuple(tasks), folder=Path("study"), scheduler=cluster.scheduler_address)
+        study = Study(runs=tuple(tasks), folder=Path("study"), scheduler=cluster.scheduler_address)
         records = run_study(study, progress=lambda task, record: print(record))
 
 # %%

@@ -9,8 +9,8 @@ This page can be downloaded as a notebook.
 
 import nlp_gait
 from compare.study.record import make_frame
-from compare.study.run_study import Study, run_study
-from compare.study.task import ProblemSpec, Stop, Task
+from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.study import Study, run_study
 
 # %%
 # A solution is a table of its variables, with the prices of its active bounds.
@@ -37,9 +37,11 @@ figure
 
 algorithms = {"ipopt": Stop(), "pso": Stop(evaluations=2000)}
 tasks = [
-    Task(problem=ProblemSpec(name="nao-dsp"), solver=a, run=k, stop=s) for a, s in algorithms.items() for k in range(3)
+    Run(problem=ProblemSpec(name="nao-dsp"), solver=a, number=k, stop=s)
+    for a, s in algorithms.items()
+    for k in range(3)
 ]
-study = Study(tasks=tuple(tasks))
+study = Study(runs=tuple(tasks))
 study
 
 # %%

@@ -14,8 +14,8 @@ from compare.analysis.comparison import compare_problems
 from compare.drawing.charts import plot_charts
 from compare.drawing.comparison_figures import make_final_gap_charts
 from compare.study.import_runs import import_runs
-from compare.study.run_study import Study, run_study
-from compare.study.task import ProblemSpec, Task
+from compare.study.run import ProblemSpec, Run
+from compare.study.study import Study, run_study
 
 spec = ProblemSpec(name="nao-dsp")
 
@@ -35,8 +35,8 @@ with Path("finals.csv").open("w", newline="") as file:
 # The records are compared with those of solvers that run here.
 
 records = import_runs(spec, Path("finals.csv"), "paper (MATLAB)")
-tasks = [Task(problem=spec, solver=algorithm, run=k) for algorithm in ("ipopt", "pso") for k in range(3)]
-(comparison,) = compare_problems([*records, *run_study(Study(tasks=tuple(tasks)))])
+tasks = [Run(problem=spec, solver=algorithm, number=k) for algorithm in ("ipopt", "pso") for k in range(3)]
+(comparison,) = compare_problems([*records, *run_study(Study(runs=tuple(tasks)))])
 for row in summarise(comparison):
     claim = "no claim" if row["best_reported"] is None else f"claims {row['best_reported']:.4f} W"
     print(f"{row['solver']}: {row['feasible']} of {row['runs']} feasible, {claim}, judged {row['best']:.4f} W at best")

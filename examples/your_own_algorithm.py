@@ -17,8 +17,8 @@ from compare.drawing.charts import plot_charts
 from compare.drawing.comparison_figures import make_convergence_charts
 from compare.report.document import Document, make_text_table
 from compare.report.writing import render_markdown
-from compare.study.run_study import Study, run_study
-from compare.study.task import ProblemSpec, Task
+from compare.study.run import ProblemSpec, Run
+from compare.study.study import Study, run_study
 
 # %%
 # The settings of the algorithm start a search.
@@ -64,8 +64,8 @@ class ShrinkingBoxSearch:
 # Five runs of each solver, judged by the same exact functions.
 
 problem, runs = ProblemSpec(name="nao-ssp"), {"shrinking-box": ShrinkingBox(), "pso": "pso", "ipopt": "ipopt"}
-tasks = [Task(problem=problem, solver=algorithm, run=k) for algorithm in runs.values() for k in range(5)]
-(comparison,) = compare_problems(run_study(Study(tasks=tuple(tasks))))
+tasks = [Run(problem=problem, solver=algorithm, number=k) for algorithm in runs.values() for k in range(5)]
+(comparison,) = compare_problems(run_study(Study(runs=tuple(tasks))))
 table = make_text_table(*format_rows(comparison))
 print(render_markdown(Document(title="A shrinking box", parts=[table])))
 

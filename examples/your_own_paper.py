@@ -19,7 +19,7 @@ from compare.papers.paper import Paper, count_verdicts, read_book
 from compare.papers.paper_runs import Effort, Runner, choose_best, evaluate_point, make_search_tasks, make_start_tasks
 from compare.papers.rules import Found
 from compare.report.document import Figure
-from compare.study.task import ProblemSpec
+from compare.study.run import ProblemSpec
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
 
 BOOK = read_book(__file__)
@@ -50,11 +50,11 @@ def compute(runner, effort):
 
 
 def list_powers(found):
-    return [choose_best(found.runs[f"walker-{speed:g}", "ipopt"]).verdict.objective for speed in SPEEDS_M_S]
+    return [choose_best(found.runs[f"walker-{speed:g}", "ipopt"]).objective for speed in SPEEDS_M_S]
 
 
 def compare_searches(found):
-    pso, ga = ([run.verdict.objective for run in found.runs[found.spec.title, search]] for search in SEARCHES)
+    pso, ga = ([run.objective for run in found.runs[found.spec.title, search]] for search in SEARCHES)
     return Found(np.median(ga) - np.median(pso), p=approximate_rank_sum(pso, ga).p_two_sided)
 
 

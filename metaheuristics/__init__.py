@@ -33,7 +33,6 @@ from metaheuristics.registry import (
     make_algorithm,
     make_handling,
 )
-from metaheuristics.settings import tunable
 from metaheuristics.user_algorithm import PlainFunction, to_algorithm
 
 __all__ = [
@@ -70,5 +69,4 @@ __all__ = [
     "make_handling",
     "minimize",
     "to_algorithm",
-    "tunable",
 ]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import MISSING, field, fields, is_dataclass
+from dataclasses import MISSING, fields
 from functools import partial
 from importlib.util import find_spec
 from numbers import Integral, Real
 from operator import ge, gt, le
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from metaheuristics.errors import SearchError, abbreviate
 
@@ -17,40 +17,6 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 COMPARISONS = {">": gt, ">=": ge, "<=": le}
-RANGE = "range"  # key of a field's metadata
-Range = tuple[float, float] | tuple[float, float, str] | tuple[str, ...]
-T = TypeVar("T")
-
-
-def tunable(default: T, *within: float | str) -> T:
-    """Return a field of settings with a default, and what a tuner may choose.
-
-    Args:
-        default: value without tuning.
-        within: the least and the greatest value, then ``"log"`` if their ratio counts; or two or more texts.
-    """
-    value: T = field(default=default, metadata={RANGE: within})
-    return value
-
-
-def list_ranges(settings: object) -> dict[str, Range]:
-    """Return what a tuner may choose, by setting: fields of a data class, see ``tunable``, and its attribute ``ranges``.
-
-    Raises:
-        SearchError: a range is neither two finite numbers, ascending, nor texts.
-    """
-    settings_fields = fields(settings) if is_dataclass(settings) and not isinstance(settings, type) else ()
-    ranges = {entry.name: entry.metadata[RANGE] for entry in settings_fields if RANGE in entry.metadata}
-    ranges |= getattr(settings, "ranges", {})
-    for name, within in ranges.items():
-        low, high, *scale = within if len(within) > 1 else (math.nan, math.nan)
-        if all(isinstance(value, str) for value in within) and len(within) > 1:
-            continue
-        if not all(isinstance(value, Real) and math.isfinite(value) for value in (low, high)) or not low < high:
-            raise SearchError(f"the range of {name!r} must be (least, greatest) or texts, got {abbreviate(within)}")
-        if scale not in ([], ["log"]) or (scale and low <= 0):
-            raise SearchError(f'the range of {name!r} may end with "log" if it is above 0, got {abbreviate(within)}')
-    return ranges
 
 
 def is_number(value: object, kind: type = Real) -> bool:

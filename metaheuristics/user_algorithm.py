@@ -90,11 +90,6 @@ class PlainFunction:
                 + f"; it takes {inspect.signature(self.function)}"
             )
 
-    @property
-    def ranges(self) -> Mapping[str, Any]:
-        """What a tuner may choose, see ``metaheuristics.settings.list_ranges``: the function's own attribute."""
-        return getattr(self.function, "ranges", {})
-
     def start(self, start: Start) -> "_FunctionSearch":
         """Begin a run; see `Algorithm.start`."""
         return _FunctionSearch(self, start)

@@ -1,40 +1,32 @@
-"""Child processes: forks that share some work, one isolated fork, or joblib's workers. None of them outlives its parent.
+"""Child processes: a pool of jobs, each with a time limit, and forks that share work. None of them outlives its parent.
 
-A fork has everything that its parent has and starts within milliseconds; only its results are pickled. Workers start afresh:
-their functions are pickled too. Python files in the working folder never run by themselves.
+A fork has everything that its parent has and starts within milliseconds; only results are pickled. Where there is no fork
+(Windows), jobs are pickled, too. Python files in the working folder never run by themselves.
 """
 
 import ctypes
-import math
 import mmap
 import multiprocessing
 import os
 import signal
 import sys
-import threading
-import time
 import warnings
-from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
 from nlp_gait.errors import NoWorkersError, WorkerError, describe_shortage
 from nlp_gait.interrupts import block_interrupts_in_children, never
 
-K = TypeVar("K")
 T = TypeVar("T")
 
+CHECKED_EVERY_S = 0.05
 PARENT_CHECKED_EVERY_S = 0.5
-STOP_CHECKED_EVERY_S = 0.05
 END_WITHIN_S = 5.0  # a child that is to end is killed after this time
-COUNTER_BYTES = 8
-# Warnings of joblib's resource tracker, which removes what killed workers leave behind, about what is gone already.
-HIDDEN_WARNINGS = "ignore:resource_tracker"
-SPARE_DESCRIPTORS = 12  # that joblib needs beside one for each worker
 PR_SET_PDEATHSIG = 1
-QUESTION = b"?"  # first byte of a message of an isolated process that is no result
 VARIABLE = "PYTHONSAFEPATH"  # any text: Python searches no module in the working folder
 OWN_VALUE = "nlp-gait"
 
@@ -68,21 +60,170 @@ def has_fork() -> bool:
     return "fork" in multiprocessing.get_all_start_methods() and not multiprocessing.current_process().daemon
 
 
-def _fork(work: Callable[[Connection], None]) -> tuple[Connection, BaseProcess]:
-    context = multiprocessing.get_context("fork")
-    results, sender = context.Pipe()
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """A call in another process; where there are no forks it is pickled."""
 
-    def begin() -> None:
-        multiprocessing.current_process().daemon = False  # it may fork, too: a robot file is read in a child
-        work(sender)
+    #: Receives a function that sends a picklable message to this process, and returns something picklable
+    call: Callable[[Callable[[Any], None]], Any]
+    receive: Callable[[Any], None] = lambda message: None  #: receives the messages
+    is_late: Callable[[], bool] = never  #: whether to kill its process now, asked from its start
+    #: In a process and session of its own, without input and output, that is killed at the end with all that it has started
+    alone: bool = False
+    memory_bytes: int | None = None  #: if alone: most address space beyond that of this process (Linux only)
 
-    process = context.Process(target=begin, daemon=True)
-    with warnings.catch_warnings():
-        # Python warns of forks of a process with threads. The locks that the work takes are free in the child.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        process.start()
-    sender.close()
-    return results, process
+
+@dataclass(kw_only=True)
+class _Worker:
+    """A child process and its job."""
+
+    process: Any
+    pipe: Connection
+    job: Job
+    number: int = 0
+
+    def end(self) -> None:
+        """Kill the process, and of a job that runs alone all that it has started."""
+        if self.job.alone:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.kill()
+        self.process.join()
+        self.pipe.close()
+
+    def listen(self) -> tuple[bool, Any]:
+        """Return whether the job has ended, and what it returned, or its error."""
+        try:
+            while self.pipe.poll():
+                is_result, value = self.pipe.recv()
+                if is_result:
+                    return True, value
+                self.job.receive(value)
+            if not self.process.is_alive() and not self.pipe.poll():  # what it has started may hold its pipe
+                raise EOFError
+        except (EOFError, OSError):
+            self.process.join(END_WITHIN_S)
+            code = self.process.exitcode or 0
+            ending = f"signal {signal.Signals(-code).name}" if code < 0 else f"status {code}"
+            return True, WorkerError(f"its process ended without a result, by {ending}")
+        except Exception as error:
+            return True, WorkerError(f"its process sent something that cannot be read: {error}")
+        is_late = self.job.is_late()
+        return is_late, TimeoutError() if is_late else None
+
+
+def run_jobs(
+    jobs: Sequence[Job], workers: int = 1, stop: Callable[[], bool] = never, method: str | None = None
+) -> Iterator[tuple[int, Any]]:
+    """Run jobs in so many processes; yield the number of each and what it returned, or its exception, as it ends.
+
+    A job that ends its process yields a WorkerError, and one that is late a TimeoutError; the others continue.
+    Once ``stop`` returns True, no more jobs are started. ``method`` is that of multiprocessing, by default fork where there is
+    one. Raises NoWorkersError if processes cannot begin.
+    """
+    context = multiprocessing.get_context(method or ("fork" if has_fork() else "spawn"))
+    waiting, active, idle = deque(range(len(jobs))), list[_Worker](), list[_Worker]()
+    stopped = False
+    try:
+        while active or (waiting and not stopped):
+            stopped = stopped or stop()
+            while waiting and len(active) < workers and not stopped:
+                job = jobs[waiting[0]]
+                worker = idle.pop() if idle and not job.alone else _start_worker(context, jobs, job)
+                worker.job, worker.number = job, waiting.popleft()
+                active.append(worker)
+                with suppress(OSError):  # it has died, which is found below
+                    worker.pipe.send(worker.number)
+            wait([worker.pipe for worker in active], CHECKED_EVERY_S)
+            for worker in [*active]:
+                is_over, result = worker.listen()
+                if is_over:
+                    active.remove(worker)
+                    if worker.job.alone or not worker.process.is_alive() or isinstance(result, TimeoutError):
+                        worker.end()
+                    else:
+                        idle.append(worker)
+                    yield worker.number, result
+    finally:
+        for worker in (*active, *idle):
+            worker.end()
+
+
+def _start_worker(context: Any, jobs: Sequence[Job], job: Job) -> _Worker:
+    is_fork = context.get_start_method() == "fork"
+    calls = [item.call for item in jobs] if is_fork or not job.alone else {jobs.index(job): job.call}
+    try:
+        pipe, other = context.Pipe()
+        arguments = (other, calls, job.alone, job.memory_bytes, os.getpid())
+        process = context.Process(target=_serve, args=arguments, daemon=True)
+        with warnings.catch_warnings(), block_interrupts_in_children():
+            # Python warns of forks of a process with threads. The locks that the work takes are free in the child.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            process.start()
+    except OSError as error:
+        shortage = describe_shortage(error) or error.strerror or error
+        raise NoWorkersError(f"worker processes cannot begin: {shortage}; use fewer --jobs") from error
+    other.close()
+    return _Worker(process=process, pipe=pipe, job=job)
+
+
+def _serve(pipe: Connection, calls: Any, alone: bool, memory_bytes: int | None, parent: int) -> None:
+    """Perform the calls whose numbers arrive, until the parent has ended."""
+    multiprocessing.current_process().daemon = False  # it may fork, too: a robot file is read in a child
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if alone:
+        _isolate(memory_bytes)
+    with suppress(EOFError, OSError):
+        while pipe.poll(PARENT_CHECKED_EVERY_S) or os.getppid() == parent:
+            if not pipe.poll():
+                continue
+            call = calls[pipe.recv()]
+            result: Any
+            try:
+                result = call(lambda message: pipe.send((False, message)))
+            except BaseException as error:  # user code may raise anything
+                result = error
+            try:
+                pipe.send((True, result))
+            except Exception as error:  # it cannot be pickled
+                pipe.send((True, WorkerError(f"{type(result).__name__}: {result} ({error})")))
+    os._exit(0)  # without the exit handlers of the parent
+
+
+def _isolate(memory_bytes: int | None) -> None:
+    """Give this process a session, null streams, and at most so much more address space."""
+    show_working_folder()
+    if hasattr(os, "setsid"):
+        os.setsid()
+    if memory_bytes is not None and sys.platform == "linux":
+        import resource
+
+        with open("/proc/self/statm", encoding="ascii") as file:
+            most = int(file.read().split()[0]) * mmap.PAGESIZE + memory_bytes
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
+        resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2):
+        os.dup2(nowhere, descriptor)
+    # New streams: a lock of the old ones may be held by a thread that does not exist here.
+    sys.stdout = sys.stderr = open(nowhere, "w", encoding="utf-8", errors="replace", closefd=False)  # noqa: SIM115
+
+
+def run_alone(
+    call: Callable[[Callable[[Any], None]], T],
+    is_late: Callable[[], bool] = never,
+    receive: Callable[[Any], None] = lambda message: None,
+    memory_bytes: int | None = None,
+) -> T:
+    """Return what a call returns that runs alone, see ``Job``; raises as the call, WorkerError and TimeoutError."""
+    job = Job(call=call, is_late=is_late, receive=receive, alone=True, memory_bytes=memory_bytes)
+    ((_, result),) = run_jobs([job])
+    if isinstance(result, BaseException):
+        raise result
+    value: T = result
+    return value
 
 
 def run_in_forks(
@@ -90,225 +231,29 @@ def run_in_forks(
 ) -> Iterator[T]:
     """Yield work(0), ..., work(count - 1) in this order; after ``stop`` returns True, only those that were started.
 
-    ``work`` receives its number, and a function that returns whether to end early; what it returns or raises is pickled. Each of
-    the processes takes the next number. Raises WorkerError if one died, perhaps out of memory.
+    ``work`` receives its number, and a function that returns whether to end early. Raises what it raises, and WorkerError if a
+    process died.
     """
-    # Anonymous memory: a Value would be a temporary file, for which there may be no space.
-    lock, taken, ending = multiprocessing.get_context("fork").Lock(), mmap.mmap(-1, COUNTER_BYTES), mmap.mmap(-1, 1)
-    parent = os.getpid()
+    ending = mmap.mmap(-1, 1)  # anonymous memory: a Value would be a temporary file, for which there may be no space
 
-    def is_ending() -> bool:
-        return ending[0] != 0 or os.getppid() != parent
+    def check() -> bool:
+        ending[0] = ending[0] or stop()
+        return ending[0] != 0
 
-    def run(results: Connection) -> None:
-        while not is_ending():
-            with lock:
-                number = int.from_bytes(taken[:], sys.byteorder)
-                taken[:] = (number + 1).to_bytes(COUNTER_BYTES, sys.byteorder)
-            if number >= count:
-                break
-            try:
-                results.send((number, work(number, is_ending)))
-            except Exception as error:
-                results.send((number, error))
-        results.close()
-
-    def check_stop() -> None:
-        if stop():
-            ending[0] = 1
-
-    children: list[tuple[Connection, BaseProcess]] = []
-    try:
-        with block_interrupts_in_children():
-            for _ in range(workers):
-                children.append(_fork(run))
-        for result in _collect(dict(children), check_stop):
-            if isinstance(result, Exception):
-                raise result
-            yield result
-    finally:
-        ending[0] = 1
-        for results, process in children:
-            results.close()
-            process.join(END_WITHIN_S)
-            if process.is_alive():
-                process.kill()
-                process.join()
-
-
-def _collect(processes: dict[Connection, BaseProcess], check_stop: Callable[[], None]) -> Iterator[Any]:
-    """Yield what all children return or raise, by their numbers."""
-    early: dict[int, Any] = {}
+    jobs = [Job(call=lambda _, k=k: work(k, lambda: ending[0] != 0)) for k in range(count)]  # type: ignore[misc]
+    early: dict[int, T] = {}
     following = 0
-    while processes:
-        for results in wait(list(processes), timeout=STOP_CHECKED_EVERY_S):
-            assert isinstance(results, Connection)
-            try:
-                early.update([results.recv()])
-            except EOFError:
-                process = processes.pop(results)
-                process.join()
-                if process.exitcode:
-                    raise WorkerError(
-                        f"a worker process died with exit code {process.exitcode}, perhaps out of memory; use fewer workers"
-                    ) from None
-        check_stop()
+    for number, result in run_jobs(jobs, workers, check):
+        if isinstance(result, BaseException):
+            raise result
+        early[number] = result
         while following in early:
             yield early.pop(following)
             following += 1
     yield from (early[number] for number in sorted(early))  # stopped: earlier ones are missing
 
 
-def run_in_isolation(
-    call: Callable[..., bytes],
-    time_limit_s: float | None,
-    most_bytes: int,
-    memory_bytes: int | None = None,
-    answer: Callable[[bytes], bytes] | None = None,
-    stop: Callable[[], bool] = never,
-) -> bytes:
-    """Return what a call returns, at most so many bytes, in a forked process with its own session, without input and output.
-
-    The call may hang, crash, exit or print. Its process and everything that it has started are killed at the end.
-    With ``memory_bytes``, it may take so much address space beyond what this process has (Linux only). With ``answer``, the call
-    receives a function by which it asks this process. Raises TimeoutError after the time limit or once ``stop`` returns True, and
-    WorkerError, which says how, if the process ended without a result.
-    """
-    results, process = _fork(lambda sender: _isolate(sender, call, memory_bytes, answer is not None))
-    latest = math.inf if time_limit_s is None else time.monotonic() + time_limit_s
-    try:
-        while True:
-            while not wait([results, process.sentinel], STOP_CHECKED_EVERY_S):
-                if time.monotonic() > latest or stop():
-                    raise TimeoutError
-            data = b""
-            with suppress(EOFError, OSError):
-                data = results.recv_bytes(most_bytes) if results.poll(0) else b""
-            if answer is None or data[:1] != QUESTION:
-                break
-            with suppress(BrokenPipeError):
-                results.send_bytes(answer(data[1:]))
-        if not data:
-            process.join(END_WITHIN_S)
-            code = process.exitcode or 0
-            ending = f"signal {signal.Signals(-code).name}" if code < 0 else f"status {code}"
-            raise WorkerError(f"its process ended without a result, by {ending}")
-        return data
-    finally:
-        if process.pid is not None:
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)
-        process.kill()
-        process.join()
-        results.close()
-
-
-def _isolate(sender: Connection, call: Callable[..., bytes], memory_bytes: int | None, may_ask: bool) -> None:
-    def ask(question: bytes) -> bytes:
-        sender.send_bytes(QUESTION + question)
-        return sender.recv_bytes()
-
-    show_working_folder()
-    os.setsid()
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-        if memory_bytes is not None:
-            import resource
-
-            with open("/proc/self/statm", encoding="ascii") as file:
-                most = int(file.read().split()[0]) * mmap.PAGESIZE + memory_bytes
-            _, hard = resource.getrlimit(resource.RLIMIT_AS)
-            resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    for descriptor in (0, 1, 2):
-        os.dup2(nowhere, descriptor)
-    # New streams: a lock of the old ones may be held by a thread that does not exist here.
-    sys.stdout = sys.stderr = open(nowhere, "w", encoding="utf-8", errors="replace", closefd=False)  # noqa: SIM115
-    sender.send_bytes(call(ask) if may_ask else call())
-    sender.close()
-    os._exit(0)  # without the exit handlers of the parent
-
-
-def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterator[tuple[K, T]]:
-    """Call picklable functions in so many processes; yield key and result as each finishes; raises WorkerError if one dies."""
-    from joblib import Parallel, delayed  # costs 0.1 s to import
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-    if HIDDEN_WARNINGS not in sys.warnoptions:  # which joblib's processes inherit
-        sys.warnoptions.append(HIDDEN_WARNINGS)
-    begin = {"initializer": exit_with_parent, "initargs": (os.getpid(),)}
-    parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, **begin)
-    results: Generator[tuple[K, T], None, None] | None = None
-    try:
-        with block_interrupts_in_children():
-            try:
-                folder = os.getcwd()
-            except OSError as error:
-                raise NoWorkersError(
-                    f"worker processes cannot begin: the working folder is gone ({error.strerror}); use another"
-                ) from error
-            try:
-                with ExitStack() as opened:  # can this process open so many more files?
-                    for _ in range(workers + SPARE_DESCRIPTORS):
-                        opened.callback(os.close, os.open(os.devnull, os.O_RDONLY))
-                results = parallel(delayed(_call)(key, call, folder) for key, call in calls.items())
-            except Exception as error:
-                shortage = describe_shortage(error) or (isinstance(error, OSError) and (error.strerror or error))
-                if not shortage:
-                    raise
-                kill_children()
-                raise NoWorkersError(f"worker processes cannot begin: {shortage}; use fewer --jobs") from error
-        for result in results:  # noqa: UP028  `yield from` would close them before the lines below
-            yield result
-    except (TerminatedWorkerError, BrokenPipeError) as error:  # the pipe is joblib's own, to its processes
-        raise WorkerError(
-            "a worker process died, perhaps out of memory; finished results are stored: rerun to continue"
-        ) from error
-    finally:
-        with warnings.catch_warnings(), _silence_manager():
-            warnings.simplefilter("ignore")  # joblib reports calls that were cancelled
-            if results is not None:
-                results.close()
-
-
-@contextmanager
-def _silence_manager() -> Iterator[None]:
-    """Hide the traceback of joblib's manager thread when calls are cancelled just as it hands one of them out."""
-    before = threading.excepthook
-
-    def hook(raised: threading.ExceptHookArgs) -> None:
-        if not (raised.exc_type is KeyError and raised.thread and "ExecutorManager" in raised.thread.name):
-            before(raised)
-
-    threading.excepthook = hook
-    try:
-        yield
-    finally:
-        threading.excepthook = before
-
-
-def exit_with_parent(parent: int) -> None:
-    """Let this worker process end within a second of its parent, however that ends."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(PARENT_CHECKED_EVERY_S)
-        os._exit(1)
-
-    threading.Thread(target=watch, name="nlp-gait-parent", daemon=True).start()
-
-
 def kill_children() -> None:
     """Kill workers that have begun; else each would print a traceback when it finds that this process has ended."""
     for child in multiprocessing.active_children():
-        if child.pid is not None:
-            with suppress(ProcessLookupError):
-                os.kill(child.pid, signal.SIGKILL)  # joblib's processes have no method for it
-
-
-def _call(key: K, call: Callable[[], T], folder: str) -> tuple[K, T]:
-    """Call in the folder of the caller: a worker keeps that in which it was started, and paths may be relative."""
-    if os.getcwd() != folder:
-        os.chdir(folder)
-    return key, call()
+        child.kill()

@@ -20,8 +20,8 @@ import metaheuristics
 import nlp_gait
 from compare.cli import app
 from compare.judge import evaluate
-from compare.study.run_study import Study, run_study
-from compare.study.task import ProblemSpec, Stop, Task
+from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.study import Study, run_study
 from metaheuristics import registry as algorithms
 from metaheuristics.interface import Array, Start
 from nlp_gait.formulation import (
@@ -116,8 +116,8 @@ def test_a_problem_is_one_function_and_one_line(monkeypatch: pytest.MonkeyPatch)
     assert verdict.feasible and verdict.dense_intervals == 1000
     assert problem.signals(solution.x).arrays["q"].max() == pytest.approx(0.03, abs=1e-6)
     spec = ProblemSpec(name="hopping-foot", options={"intervals": 10})
-    records = run_study(Study(tasks=(Task(problem=spec, solver="pso", stop=Stop(evaluations=2000)),)))
-    assert records[0].verdict.objective == pytest.approx(solution.objective, rel=1e-3)
+    records = run_study(Study(runs=(Run(problem=spec, solver="pso", stop=Stop(evaluations=2000)),)))
+    assert records[0].objective == pytest.approx(solution.objective, rel=1e-3)
     done = CliRunner().invoke(app, ["solve", "hopping-foot", "--starts", "1"])
     assert done.exit_code == 0 and "power" in done.output
 

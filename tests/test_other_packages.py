@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from compare.analysis.tuning import TRAINING_SEED, compute_area, tune_solvers
 
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.record_statistics import compute_ecdf
-from compare.analysis.tuning import TRAINING_SEED, compute_area, tune_solvers
 from compare.logs import write_ioh
-from compare.study.run_study import Study, run_study
+from compare.study.run import ProblemSpec, Stop
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.task import ProblemSpec, Stop
+from compare.study.study import Study, run_study
 from nlp_gait import gaitbench
 from nlp_gait.formulation import Array
 from tests.backends.toys import corner, toy
@@ -179,7 +179,7 @@ def test_a_tuned_search_is_better_and_the_same_again(tmp_path: Path) -> None:
         stop=Stop(evaluations=200),
     )
     said: list[str] = []
-    study = Study(tasks=settings.tasks(), folder=tmp_path / "study")
+    study = Study(runs=settings.make_runs(), folder=tmp_path / "study")
     tuned = tune_solvers(study, settings, 7, said.append)
     assert [solver.label or solver.name for solver in tuned.solvers][:3] == ["random", "de", "de-tuned"]
     assert said[0] == "random has no settings to tune" and len(tuned.solvers) == 5
@@ -187,6 +187,6 @@ def test_a_tuned_search_is_better_and_the_same_again(tmp_path: Path) -> None:
     training = StudySettings(
         problems=settings.problems, solvers=tuned.solvers, stop=settings.stop, runs=1, seed=TRAINING_SEED
     )
-    gaps = {s.name: s.curves[0] for s in compare_problems(run_study(Study(tasks=training.tasks())))[0].solvers}
+    gaps = {s.name: s.curves[0] for s in compare_problems(run_study(Study(runs=training.make_runs())))[0].solvers}
     for name in ("de", next(name for name in gaps if name.endswith("steps"))):
         assert compute_area(gaps[f"{name}-tuned"], 200) > compute_area(gaps[name], 200)

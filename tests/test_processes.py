@@ -1,49 +1,216 @@
-"""Worker processes that cannot begin, die, or are no longer needed."""
+"""Jobs in processes: those that crash, exit, raise, hang or answer nonsense are errors of their own, and all others return."""
 
 import errno
+import faulthandler
+import multiprocessing
 import os
+import re
+import signal
+import subprocess
+import sys
 import time
-import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
-from joblib.externals.loky import get_reusable_executor
 
-from nlp_gait.errors import NoWorkersError, WorkerError
-from nlp_gait.processes import run_in_processes
+from nlp_gait import processes
+from nlp_gait.errors import InputError, NoWorkersError, WorkerError
+from nlp_gait.interrupts import never
+from nlp_gait.processes import Job, keep_working_folder, run_alone, run_in_forks, run_jobs
+from tests.faults.processes import ROOT, wait_for
+
+METHODS = [method for method in ("fork", "spawn") if method in multiprocessing.get_all_start_methods()]
+needs_fork = pytest.mark.skipif("fork" not in METHODS, reason="processes cannot be copied here")
+Send = Callable[[Any], None]
 
 
-def no_reader() -> None:
-    """As joblib meets it where its own processes cannot begin."""
-    raise BrokenPipeError("Broken pipe")
+class Unreadable(Exception):
+    """It is pickled, but its class cannot be made from its text alone."""
+
+    def __init__(self, first: int, second: int) -> None:
+        super().__init__(f"{first} {second}")
+
+
+def misbehave(kind: str, send: Send) -> object:
+    if kind == "crashes":
+        faulthandler.disable()
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if kind == "is killed":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if kind == "exits":
+        os._exit(3)
+    if kind == "leaves":
+        sys.exit("enough")
+    if kind == "hangs":
+        time.sleep(600)
+    if kind == "raises":
+        raise InputError("no")
+    if kind == "is unreadable":
+        raise Unreadable(1, 2)
+    return lambda: kind  # cannot be pickled
+
+
+ENDS = {
+    "crashes": (WorkerError, "its process ended without a result, by signal SIGSEGV"),
+    "is killed": (WorkerError, "its process ended without a result, by signal SIGKILL"),
+    "exits": (WorkerError, "its process ended without a result, by status 3"),
+    "leaves": (SystemExit, "enough"),
+    "hangs": (TimeoutError, ""),
+    "raises": (InputError, "no"),
+    "is unreadable": (WorkerError, "its process sent something that cannot be read: .*second"),
+    "returns a function": (WorkerError, ".*[Cc]an't pickle|.*[Cc]an't get local"),
+}
+
+
+def square(number: int, send: Send) -> tuple[int, int]:
+    send(number)
+    return number * number, os.getpid()
+
+
+def is_over(end: float) -> bool:
+    return time.monotonic() > end
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("call", [partial(os._exit, 3), no_reader])
-def test_a_process_that_is_gone_is_one_sentence(call: Callable[[], None]) -> None:
-    """Also outside studies, where nothing is tried again; a broken pipe is not taken for the reader of the output."""
-    with pytest.raises(WorkerError, match="a worker process died"):
-        list(run_in_processes({0: call, 1: os.getpid}, workers=2))
+@pytest.mark.parametrize("alone", [False, True])
+@pytest.mark.parametrize("method", METHODS)
+def test_each_job_ends_in_its_own_way_and_the_others_return(method: str, alone: bool) -> None:
+    every = 4 if alone and method == "spawn" else 1  # each process imports everything
+    names, heard, found = list(ENDS)[::every], list[int](), dict[int, Any]()
+    late = {"hangs": lambda: len(found) == len(jobs) - 1}  # when all others have ended
+    jobs = [Job(call=partial(misbehave, name), is_late=late.get(name, never), alone=alone) for name in names]
+    jobs += [Job(call=partial(square, k), receive=heard.append, alone=alone) for k in range(6)]
+    for number, result in run_jobs(jobs, 3, method=method):
+        assert number not in found
+        found[number] = result
+    assert len(found) == len(jobs)
+    for number, name in enumerate(names):
+        kind, text = ENDS[name]
+        assert type(found[number]) is kind, name
+        assert re.match(text, str(found[number])), name
+    assert [found[len(names) + k][0] for k in range(6)] == [k * k for k in range(6)] and sorted(heard) == list(range(6))
+    pids = {found[len(names) + k][1] for k in range(6)}
+    assert os.getpid() not in pids and (len(pids) == 6 if alone else len(pids) <= 3)
+    assert not multiprocessing.active_children()
+
+
+@needs_fork
+def test_messages_arrive_in_order_before_the_result_and_decide_how_long_it_may_run() -> None:
+    def count(send: Send) -> str:
+        for number in range(10**9):
+            send(number)
+            time.sleep(0.001)
+        return "ended"
+
+    heard: list[int] = []
+    job = Job(call=count, receive=heard.append, is_late=lambda: len(heard) > 20, alone=True)
+    ((_, result),) = run_jobs([job])
+    assert isinstance(result, TimeoutError) and heard == list(range(len(heard))) and len(heard) > 20
+
+
+@needs_fork
+def test_no_more_jobs_begin_after_a_stop_and_a_closed_pool_leaves_no_process() -> None:
+    ended: list[int] = []
+    for number, _ in run_jobs([Job(call=partial(square, k)) for k in range(50)], 2, lambda: len(ended) >= 3):
+        ended.append(number)
+    assert 3 <= len(ended) <= 5
+    results = run_jobs([Job(call=partial(square, 0)), *[Job(call=partial(misbehave, "hangs"))] * 3], 2)
+    assert next(results)[0] == 0
+    assert multiprocessing.active_children()
+    results.close()  # type: ignore[attr-defined]
+    assert not multiprocessing.active_children()
+
+
+@needs_fork
+def test_forks_yield_in_order_and_end_early_together() -> None:
+    big = bytes(10**7)  # more than a pipe holds
+
+    def work(number: int, stop: Callable[[], bool]) -> tuple[int, int, bool]:
+        time.sleep(0.05 * (3 - number % 4))
+        return number, len(big) + number, stop()
+
+    assert [item[:2] for item in run_in_forks(work, 8, 3)] == [(k, 10**7 + k) for k in range(8)]
+    started, end = time.monotonic(), time.monotonic() + 0.5
+
+    def wait(number: int, stop: Callable[[], bool]) -> int:
+        while not stop():
+            time.sleep(0.01)
+        return number
+
+    assert list(run_in_forks(wait, 100, 3, partial(is_over, end))) == [0, 1, 2]
+    assert time.monotonic() < started + 10.0
+
+
+@needs_fork
+@pytest.mark.parametrize("name", ["is killed", "exits", "raises"])
+def test_a_fork_that_fails_ends_all(name: str) -> None:
+    def work(number: int, _: Callable[[], bool]) -> object:
+        return misbehave(name if number == 1 else "hangs" if number == 2 else "", print) if number else 0
+
+    with pytest.raises(ENDS[name][0], match=ENDS[name][1]):
+        list(run_in_forks(work, 5, 2))
+    assert not multiprocessing.active_children()
+
+
+@needs_fork
+def test_what_runs_alone_has_no_streams_its_own_session_and_no_survivors(capfd: pytest.CaptureFixture[str]) -> None:
+    def call(send: Send) -> tuple[str, int]:
+        print("to the output")
+        os.write(2, b"to the errors")
+        child = subprocess.Popen(["sleep", "600"])
+        send((os.getsid(0), child.pid))
+        return sys.stdin.read() if sys.stdin else "", os.getpid()
+
+    heard: list[tuple[int, int]] = []
+    text, pid = run_alone(call, receive=heard.append)
+    ((session, child),) = heard
+    assert (text, session) == ("", pid) and capfd.readouterr() == ("", "")
+    wait_for(lambda: not is_alive(child), 5.0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are Linux's")
+def test_memory_of_what_runs_alone_is_limited() -> None:
+    with pytest.raises(MemoryError):
+        run_alone(lambda _: len(bytearray(2**30)), memory_bytes=2**28)
+    assert run_alone(lambda _: len(bytearray(2**20)), memory_bytes=2**28) == 2**20
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+PARENT = """
+import os, sys, time
+from nlp_gait.interrupts import never
+from nlp_gait.processes import Job, run_jobs
+
+def call(send):
+    send(os.getpid())
+    time.sleep(600)
+
+jobs = [Job(call=call, receive=lambda pid: print(pid, flush=True), alone=alone) for alone in (False, True)]
+if __name__ == "__main__":
+    list(run_jobs(jobs, 2, method=sys.argv[1]))
+"""
 
 
 @pytest.mark.slow
-def test_cancelled_runs_are_not_reported_after_an_early_stop() -> None:
-    """Ctrl-C in a study is one sentence: joblib's warning of cancelled calls is not a second one."""
-    results = run_in_processes({number: partial(time.sleep, 0.05 * number) for number in range(12)}, workers=2)
-    assert next(results) == (0, None)
-    with warnings.catch_warnings(record=True) as heard:
-        warnings.simplefilter("always")
-        results.close()  # type: ignore[attr-defined]
-    assert not heard
-
-
-def test_workers_do_not_begin_in_a_folder_that_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    tmp_path.rmdir()
-    with pytest.raises(WorkerError, match="the working folder is gone"):
-        list(run_in_processes({k: partial(abs, k) for k in range(2)}, 2))
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_no_process_outlives_a_parent_that_is_killed() -> None:
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT, "fork"], cwd=ROOT, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert parent.stdout is not None
+    children = [int(parent.stdout.readline()) for _ in range(2)]
+    parent.kill()
+    parent.communicate(timeout=30)
+    wait_for(lambda: not any(map(is_alive, children)), 5.0)
 
 
 @pytest.mark.parametrize(
@@ -52,25 +219,32 @@ def test_workers_do_not_begin_in_a_folder_that_is_gone(tmp_path: Path, monkeypat
         (OSError(errno.EMFILE, "Too many open files"), "too many files are open"),
         (OSError(errno.ENFILE, "Too many open files in system"), "too many files are open"),
         (BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"), "there are too many processes or threads"),
-        (RuntimeError("can't start new thread"), "there are too many processes or threads"),
         (OSError(errno.ENOMEM, "Cannot allocate memory"), "there is not enough memory"),
-        (MemoryError("std::bad_alloc"), "there is not enough memory"),
-        (ImportError("x.so: failed to map segment from shared object"), "there is not enough memory"),
+        (OSError(errno.EPERM, "Operation not permitted"), "Operation not permitted"),
     ],
     ids=lambda value: str(value)[:40],
 )
-def test_a_shortage_at_the_start_of_workers_is_one_sentence(
-    error: Exception, sentence: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("place", ["Pipe", "Process"])
+def test_processes_that_cannot_begin_are_one_sentence(
+    place: str, error: OSError, sentence: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Joblib hides it behind an error of its own."""
+    def fail(*_: object, **__: object) -> None:
+        raise error
 
-    def begin(self: object) -> None:
-        try:
-            raise error
-        finally:
-            raise UnboundLocalError
-
-    monkeypatch.setattr("joblib.externals.loky.backend.process.LokyProcess.start", begin)
-    get_reusable_executor().shutdown(wait=True, kill_workers=True)  # else its workers would do
+    context = multiprocessing.get_context()
+    monkeypatch.setattr(context, place, fail, raising=False)
+    monkeypatch.setattr(processes.multiprocessing, "get_context", lambda method: context)
     with pytest.raises(NoWorkersError, match=f"cannot begin: {sentence}; use fewer --jobs"):
-        list(run_in_processes({k: partial(abs, k) for k in range(2)}, 2))
+        list(run_jobs([Job(call=partial(square, 2))]))
+
+
+def test_a_working_folder_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    def leave() -> Iterator[Path]:
+        with keep_working_folder():
+            os.chdir("/")
+            yield Path.cwd()
+        yield Path.cwd()
+
+    assert list(leave()) == [Path("/"), tmp_path]

@@ -35,13 +35,13 @@ CLASS = re.compile(r"^class (\w+)", re.MULTILINE)
 # First words of public functions. Not for commands and problems, which have names of their own, and formulas in `symbolic`.
 VERBS = frozenset(
     """
-    abbreviate add allow animate apply approximate are assemble assign audit average bind block bootstrap bound build call
+    abbreviate add allow animate apply approximate are assemble assign audit average bind block bootstrap bound build call catch
     certify challenge change check choose cite clip close cluster collect combine compare compile compute connect convert
     correct count cross decide decode defer define delay derive describe difference differentiate draw encode end escape
-    estimate evaluate exit explain export extrapolate fail fill filter find fingerprint fit fix flush follow format generate get
+    estimate evaluate exit explain export extrapolate fail fill filter find fit fix flush follow forget format generate get
     group guarantee halve has hash hide hold identify ignore import index infer inline interpolate is iterate join judge keep
     kill label lay limit link list load locate lock log make mark maximise measure meets minimize mirror move mutate name pack
-    parse pass perturb pick place plan plot pose predict prepare price print probe protect raise rank read rebuild record
+    parse pass perform perturb pick place plan plot pose predict prepare price print probe protect raise rank read rebuild record
     reflect register remember remove rename render renew repair repeat replace report require resolve reverse roll rotate round
     run sample save say score search seed select send share shift shorten show simulate solve split spread stack start store sum
     summarise swing tabulate take takes tie title to track train try tune turn unite unpack use verify watch weld with write

@@ -30,9 +30,9 @@ from compare.bench.baseline import (
     make_bench_study,
 )
 from compare.study.record import RunRecord
-from compare.study.run_study import Study, run_study
+from compare.study.run import Run
 from compare.study.settings import SolverSpec
-from compare.study.task import Task
+from compare.study.study import Study, run_study
 from nlp_gait import gaitbench
 from nlp_gait.files import replace_file, replace_nan, write_json
 from nlp_gait.gaitbench.generated import is_generated
@@ -56,15 +56,15 @@ def main() -> None:
     for id in ids:
         started = time.perf_counter()
         solvers = [SolverSpec(name=name) for name in BASELINE]
-        tasks = make_bench_study([id], *solvers, runs=DRAWN_RUNS if is_generated(id) else RUNS).tasks()
-        study = Study(tasks=tuple(map(limit_time, tasks)), folder=arguments.work, jobs=arguments.jobs)
+        tasks = make_bench_study([id], *solvers, runs=DRAWN_RUNS if is_generated(id) else RUNS).make_runs()
+        study = Study(runs=tuple(map(limit_time, tasks)), folder=arguments.work, jobs=arguments.jobs)
         table[id] = make_rows(run_study(study))
         write_table(row for rows in table.values() for row in rows)
         print(f"{id}: {len(table[id])} runs ({time.perf_counter() - started:.1f} s)", flush=True)
     write_json(DRAWN_FACTS, {id: replace_nan(asdict(gaitbench.load(id).facts)) for id in table if is_generated(id)})
 
 
-def limit_time(task: Task) -> Task:
+def limit_time(task: Run) -> Run:
     """Return the task, with a time limit for gradient methods."""
     return task if task.is_search else replace(task, stop=replace(task.stop, time_limit_s=GRADIENT_LIMIT_S))
 
@@ -82,7 +82,7 @@ def make_rows(records: Sequence[RunRecord]) -> list[BaselineRun]:
                 instance=comparison.problem,
                 solver=solver.name,
                 run=record.run,
-                objective=record.verdict.objective if record.verdict.feasible else math.nan,
+                objective=record.objective if record.feasible else math.nan,
                 in_history=len(curve.gap) > 0 and math.isfinite(curve.gap[-1]),
                 evaluations=round(curve.total_cost()),
                 times=tuple(round(time) for time in times if math.isfinite(time)),

@@ -48,31 +48,26 @@ def format_count(number: float) -> str:
     return f"{number:,.0f}".replace(",", "\u202f") if math.isfinite(number) else "-"
 
 
-def count_claimed(comparison: Comparison, solver: SolverRuns) -> int | None:
-    """Return the number of runs whose solver claims a feasible result; None for imported results without claims."""
-    if all(r.inputs.imported and r.claimed_objective is None for r in solver.records):
+def count_reported_feasible(comparison: Comparison, solver: SolverRuns) -> int | None:
+    """Return the number of runs whose solver reports a feasible result; None for imported results that report nothing."""
+    if all(r.inputs.imported and r.reported_objective is None for r in solver.records):
         return None
-    return sum(r.claimed for r in solver.records)
+    return sum(r.reported_feasible for r in solver.records)
 
 
 def count_dense_feasible(comparison: Comparison, solver: SolverRuns) -> int | None:
     """Return the number of runs that are feasible between the samples, too; None without a dense grid."""
-    dense = [r.verdict.dense_feasible for r in solver.records]
+    dense = [r.feasible_between_samples for r in solver.records]
     return None if all(value is None for value in dense) else sum(value is True for value in dense)
 
 
-def count_guaranteed(comparison: Comparison, solver: SolverRuns) -> int | None:
-    """Return the number proven to satisfy all limits at all times; None where that was not requested or is impossible."""
-    proofs = [r.verdict.guaranteed for r in solver.records]
-    proven = [proof.satisfied for proof in proofs if proof is not None and not proof.reason]
-    return sum(value is True for value in proven) if proven else None
-
-
-def find_best_claim(comparison: Comparison, solver: SolverRuns) -> float | None:
-    """Return the best objective that a run claims to be feasible."""
+def find_best_reported(comparison: Comparison, solver: SolverRuns) -> float | None:
+    """Return the best objective that a run reports as feasible."""
     sign = comparison.objective.sign
-    claims = [sign * r.claimed_objective for r in solver.records if r.claimed and r.claimed_objective is not None]
-    return sign * min(claims) if claims else None
+    reported = [
+        sign * r.reported_objective for r in solver.records if r.reported_feasible and r.reported_objective is not None
+    ]
+    return sign * min(reported) if reported else None
 
 
 def compute_of_feasible(
@@ -125,11 +120,10 @@ SECONDS_TO = _make_cost_columns("seconds", "seconds", ".3g")
 # What the solvers report, and what the judge finds with the exact functions.
 JUDGEMENT = (
     RUNS,
-    Column("reported feasible", count_claimed, "share"),
+    Column("reported feasible", count_reported_feasible, "share"),
     FEASIBLE,
     Column("feasible between samples", count_dense_feasible, "share"),
-    Column("guaranteed", count_guaranteed, "share"),
-    Column("best reported", find_best_claim, "objective"),
+    Column("best reported", find_best_reported, "objective"),
     Column("best", partial(compute_of_feasible, min), "objective"),
     Column("median", partial(compute_of_feasible, median), "objective"),
     Column("worst", partial(compute_of_feasible, max), "objective"),

@@ -22,7 +22,7 @@ from compare.analysis.record_statistics import (
 from compare.analysis.units import FOUND, format_gap, name_solver, with_unit
 from compare.study.record import RunRecord, find_best, group_by
 from compare.study.references import BETTER, Reference, find_reference
-from compare.study.task import GRADIENT_SOLVERS, SOURCE
+from compare.study.run import GRADIENT_SOLVERS
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Objective
 
@@ -65,7 +65,7 @@ class SolverRuns:
     @property
     def is_user_defined(self) -> bool:
         """Whether it is the user's own: code, a program, or imported results."""
-        return any(r.inputs.imported or SOURCE in r.inputs.solver for r in self.records)
+        return any(r.inputs.imported or r.inputs.code for r in self.records)
 
     @property
     def best(self) -> RunRecord | None:
@@ -110,9 +110,7 @@ class Comparison:
         """Best run if it is better than the shipped best known value; else None."""
         best, known = self.best, self.known.objective
         is_better = (
-            best is not None
-            and known is not None
-            and compute_gap(best.verdict.objective, known, self.objective) < -BETTER
+            best is not None and known is not None and compute_gap(best.objective, known, self.objective) < -BETTER
         )
         return best if is_better else None
 

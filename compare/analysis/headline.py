@@ -169,7 +169,7 @@ def describe_better(comparison: Comparison) -> str:
     run = comparison.better
     if run is None:
         return ""
-    value, objective = run.verdict.objective, comparison.objective
+    value, objective = run.objective, comparison.objective
     better = comparison.format_gap(abs(compute_gap(value, comparison.reference, objective)))
     shown = with_unit(value, objective.unit)
     return f"{name_solver(run.solver)}, run {run.run}, found a new best value, {shown}: {better} better."
@@ -208,7 +208,7 @@ def write_overall_headline(comparisons: Sequence[Comparison]) -> str:
 
 def describe_unknown(comparison: Comparison) -> list[str]:
     """Return a sentence for each solver with runs whose evaluations are unknown."""
-    unknown = {s.title: (sum(not r.evaluations for r in s.records), len(s.records)) for s in comparison.solvers}
+    unknown = {s.title: (sum(not r.counts for r in s.records), len(s.records)) for s in comparison.solvers}
     return [
         f"{name}: the number of evaluations of {count} of {runs} runs is unknown; all statistics of evaluations exclude {name}."
         for name, (count, runs) in unknown.items()
@@ -247,7 +247,7 @@ class LiveGaps:
         if best is None:
             return f"no feasible point yet ({name})"
         self._best[name] = best
-        value, known, objective = best.verdict.objective, self._known[name], best.inputs.objective
+        value, known, objective = best.objective, self._known[name], best.inputs.objective
         shown = f"best {with_unit(value, objective.unit, '.6g')}"
         if known is not None and not is_zero(known):
             shown = f"best gap {format_gap(max(compute_gap(value, known, objective), 0.0))}"

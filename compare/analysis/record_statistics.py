@@ -60,14 +60,14 @@ class Curve:
 
 def make_curve(record: RunRecord, objective: Objective, reference: float) -> Curve:
     """Return the best so far of a run, with gaps from a reference objective; its end alone if its evaluations are unknown."""
-    if not record.evaluations:
+    if not record.counts:
         gap = compute_gap(objective.sign * record.cost, reference, objective)
         return Curve(evaluations=np.array([math.nan]), seconds=np.array([record.time_s.solve]), gap=np.array([gap]))
     evaluations = np.array(record.history.evaluations, dtype=float)
     if evaluations.size:  # derivatives are counted at the end
-        evaluations[-1] = max(evaluations[-1], count_equivalent(record.evaluations, len(record.x)))
+        evaluations[-1] = max(evaluations[-1], count_equivalent(record.counts, len(record.x)))
     values = np.array([math.nan if value is None else value for value in record.history.objective], dtype=float)
-    if not record.verdict.feasible:
+    if not record.feasible:
         values[:] = math.nan  # an infeasible result has reached no target
     gaps = np.array([compute_gap(value, reference, objective) for value in values])
     return Curve(evaluations=evaluations, seconds=np.array(record.time_s.history, dtype=float), gap=gaps)
@@ -91,7 +91,7 @@ def tie(samples: Sequence[Sequence[float]], reference: float) -> list[list[float
 def find_best_known(records: Sequence[RunRecord]) -> float:
     """Return the best objective of the feasible records; NaN without any."""
     best = find_best(records)
-    return math.nan if best is None else best.verdict.objective
+    return math.nan if best is None else best.objective
 
 
 def compute_running_time(reached: Sequence[float], totals: Sequence[float]) -> float:

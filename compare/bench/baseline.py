@@ -14,9 +14,9 @@ from typing import Literal, NamedTuple
 
 from compare.analysis.best_known import is_zero
 from compare.analysis.record_statistics import ECDF_TARGETS
-from compare.study.record import History, RunRecord, Times, Verdict
+from compare.study.record import History, RunRecord, Times
+from compare.study.run import GRADIENT_SOLVERS, Handling, Inputs, ProblemSpec, Stop
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.task import GRADIENT_SOLVERS, Handling, Inputs, ProblemSpec, Stop
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError, format_value
 from nlp_gait.gaitbench.facts import Subset
@@ -134,7 +134,6 @@ def make_record(row: BaselineRun) -> RunRecord:
         problem={"name": "gaitbench", "options": {"instance": row.instance}, "parameters": {}},
         objective=problem.objective,
         solver=row.solver,
-        settings={},
         seed=row.run,
         handling=None if row.solver in GRADIENT_SOLVERS else Handling(),
     )
@@ -150,11 +149,12 @@ def make_record(row: BaselineRun) -> RunRecord:
         solver=row.solver,
         run=row.run,
         inputs=inputs,
-        claimed=row.in_history,
+        reported_feasible=row.in_history,
         x=dict.fromkeys(problem.names, math.nan),
-        claimed_objective=row.objective if row.in_history else None,
-        verdict=Verdict(objective=row.objective, violation=0.0 if feasible else math.nan, feasible=feasible),
-        evaluations={"f": row.evaluations},
+        objective=row.objective,
+        violation=0.0 if feasible else math.nan,
+        feasible=feasible,
+        counts={"f": row.evaluations},
         history=History(evaluations=tuple(times), objective=tuple(values[time] for time in times)),
         time_s=Times(history=(math.nan,) * len(times)),
     )

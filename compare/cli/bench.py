@@ -11,13 +11,12 @@ from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances
 from compare.bench.leaderboard import make_leaderboard_page, make_verdict, rank_solvers
 from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
-from compare.cli.options import Evaluations, Jobs, Scheduler, Tune, parse_names
+from compare.cli.options import Evaluations, Jobs, Scheduler, parse_names
 from compare.cli.printing import Output, Rows, describe_command, show_progress, tabulate
 from compare.report.document import Document, make_text_table
-from compare.report.writing import add_session, write_document
+from compare.report.writing import add_origin, write_document
+from compare.study.run import check_run
 from compare.study.settings import SolverSpec
-from compare.study.task import check_task
-from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
 
@@ -53,7 +52,6 @@ class BenchEffort:
     against: Annotated[str, Option(help=AGAINST)] = "random,pso,de,cma"
     runs: Annotated[int, Option(min=2, max=1000, help="Runs on each instance; the baseline has 15.")] = RUNS
     evaluations: Evaluations = EVALUATIONS
-    tune: Tune = 0
     out: Annotated[
         Path, Option(help="Folder for the page and the records; finished runs in it are reused."), OUTPUT
     ] = Path("bench")
@@ -89,23 +87,18 @@ def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEff
     solvers = {} if shipped else {name: "" for name in parse_names(effort.against) if name != algorithm}
     if algorithm is not None:
         solvers[algorithm] = label or (f"my-{algorithm}" if algorithm in BASELINE else "")  # the last one
-    if effort.tune and not solvers:
-        raise InputError(
-            "--tune needs a search that runs here: name it with --algorithm, or drawn instances with --families"
-        )
     out, records, name = make_writable_folder(effort.out), [], None
     if solvers:
         specs = [SolverSpec(name=solver, label=given) for solver, given in solvers.items()]
         settings = make_bench_study(instances, *specs, runs=effort.runs, evaluations=effort.evaluations)
-        name = settings.tasks()[-1].title if algorithm is not None else None
+        name = settings.make_runs()[-1].title if algorithm is not None else None
         if name in BASELINE:
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
         remedy = "rerun the command to continue"
-        records = run_in_folder(settings, out, effort.jobs, effort.scheduler, effort.tune, remedy)
+        records = run_in_folder(settings, out, effort.jobs, effort.scheduler, remedy)
     board = rank_solvers(instances, records, shipped=shipped)
     page = make_leaderboard_page(board, name, chosen.title, effort.evaluations)
     problems = [{"name": "gaitbench", "options": {"instance": id}} for id in instances]
-    workers = effort.scheduler or str(effort.jobs or available_cores())
     columns = {
         "rank": lambda item: str(item[0]),
         "solver": lambda item: item[1].solver,
@@ -126,7 +119,7 @@ def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEff
             tabulate(title, enumerate(board.standings, start=1), columns),
             *(() if name is None else make_verdict(board, name)),
         ],
-        written=write_document(out, add_session(page, describe_command(), problems, workers), "leaderboard"),
+        written=write_document(out, add_origin(page, describe_command(), problems), "leaderboard"),
     )
 
 
@@ -134,10 +127,10 @@ def _audit(algorithm: str | None, folder: Path) -> Output:
     """Audit a search, and write the page of its effects."""
     if algorithm is None:
         raise InputError("--audit examines one search: name it with --algorithm")
-    task = make_bench_study(INSTANCES[:1], SolverSpec(name=algorithm)).tasks()[0]
+    task = make_bench_study(INSTANCES[:1], SolverSpec(name=algorithm)).make_runs()[0]
     if not task.is_search:
         raise InputError(f"--audit examines searches, and {algorithm} uses gradients; choose a search")
-    check_task(task)
+    check_run(task)
     with show_progress("audit", len(INSTANCES) + 1) as advance:
         audit = audit_search(task.make_search(), progress=advance)
     rows = [(e.change, e.verdict, f"{e.a12:.2f}", f"{e.p:.2g}") for e in audit.effects]
@@ -152,5 +145,5 @@ def _audit(algorithm: str | None, folder: Path) -> Output:
     return Output(
         data={**asdict(audit), "effects": effects, "accusations": list(audit.accusations)},
         parts=[Rows(title, header, rows), noise, verdict],
-        written=write_document(make_writable_folder(folder), add_session(page, describe_command(), ()), "audit"),
+        written=write_document(make_writable_folder(folder), add_origin(page, describe_command(), ()), "audit"),
     )

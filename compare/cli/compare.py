@@ -2,7 +2,7 @@
 
 import inspect
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,25 +12,16 @@ from typer import Argument, Option
 from compare.analysis.columns import PRINTED, format_rows, summarise
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import LiveGaps, describe_failures, describe_unknown, write_headlines
-from compare.analysis.tuning import tune_solvers
 from compare.analysis.units import with_unit
 from compare.cli import options
-from compare.cli.command import OUTPUT, SESSION, command, get_marks, report_interrupts
+from compare.cli.command import OUTPUT, SESSION, command, get_marks
 from compare.cli.printing import Output, Rows, describe_command, say, say_error, show_progress, stderr
 from compare.report import write_report
 from compare.study.import_runs import read_imported_records
 from compare.study.record import RunRecord
-from compare.study.run_study import Study, check_study, run_study
-from compare.study.settings import (
-    Session,
-    SolverSpec,
-    StudySettings,
-    read_manifest,
-    read_settings,
-    resolve_user_code,
-    write_manifest,
-)
-from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop
+from compare.study.run import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop
+from compare.study.settings import SolverSpec, StudySettings, read_settings, resolve_user_code
+from compare.study.study import FILE, Study, read_study_file, run_study, write_command
 from metaheuristics import list_installed_algorithms
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
@@ -39,7 +30,6 @@ from nlp_gait.interrupts import Interrupted
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 MOST_RUNS = 12  # of a problem whose runs are printed one by one
-MOST_EXCLUDED = 20  # records named on a terminal
 ALL, ALL_GRADIENT = "all", (IPOPT, "slsqp")
 ALGORITHMS = (
     "Searches and other solvers, separated by commas, see `nlp-gait list`; `pso` damps its inertia weight by 0.99 as the code "
@@ -105,7 +95,6 @@ def compare(
     ] = 20,
     searches: SearchOptions,
     changes: options.ProblemOptions,
-    tune: options.Tune = 0,
     config: Annotated[Path | None, Option(help="Take the study from this TOML file instead."), SESSION] = None,
     out: Annotated[Path, Option(help=OUT), OUTPUT] = options.RESULTS,
     resume: Annotated[bool, Option("--resume", help="Continue the study in --out."), SESSION] = False,
@@ -116,7 +105,7 @@ def compare(
     """Compare IPOPT and search algorithms: one record per run, tables, figures and a report.
 
     Every finished run is stored: the same command, or `--resume`, continues an interrupted study. More runs, solvers, problems
-    or a larger budget in the same folder extend it; runs whose algorithm, problem or robot was edited are recomputed. Your own
+    or a larger budget in the same folder extend it; runs whose algorithm, problem or robot was edited run again. Your own
     problems and algorithms are named as `FILE.py:NAME`, and a program in any language as `cmd:COMMAND`.
 
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
@@ -136,10 +125,9 @@ def compare(
     if stderr.is_terminal:
         say(f"watch it: nlp-gait report {out} --watch")
     remedy = f"continue with `nlp-gait compare --resume --out {out}`"
-    records = run_in_folder(settings, out, jobs, scheduler, tune, remedy)
-    imported = read_imported_records(out, records)
-    records += imported.records
-    written = write_report(out, records, read_manifest(out), excluded=imported.excluded)
+    records = run_in_folder(settings, out, jobs, scheduler, remedy)
+    records += read_imported_records(out, records)
+    written = write_report(out, records, read_study_file(out))
     comparisons = compare_problems(records)
     for sentence in (sentence for comparison in comparisons for sentence in describe_failures(comparison)):
         say_error(sentence)
@@ -150,57 +138,41 @@ def compare(
         parts=[*_tabulate_runs(comparisons), *describe_summaries(comparisons)],
         written=written,
         answer=write_headlines(comparisons),
-        failures=[*list_excluded(imported.sentences), *([remedy] if lost else [])],
+        failures=[remedy] if lost else [],
     )
 
 
 def read_interrupted_study(out: Path) -> StudySettings:
     """Return the settings of the study in a folder; raises InputError if the folder contains no study."""
-    settings = read_manifest(out).settings
+    settings = read_study_file(out).read_settings(f"study {str(out / FILE)!r}")
     if settings is None:
         raise InputError(f"{str(out)!r} contains no study to resume (study.json); omit --resume to start one")
     return resolve_user_code(settings, f"the study in {str(out)!r}")
 
 
 def run_in_folder(
-    settings: StudySettings, out: Path, jobs: int | None, scheduler: str | None, tune: int, remedy: str
+    settings: StudySettings, out: Path, jobs: int | None, scheduler: str | None, remedy: str
 ) -> list[RunRecord]:
-    """Run a study in a folder, each search also tuned by so many trials, and return all records, also of earlier commands.
+    """Run a study in a folder, and return all records, also of earlier commands.
 
     The remedy says how to continue, in the sentence with which Ctrl-C ends the command.
     """
     study = Study(
-        tasks=settings.tasks(), folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
+        runs=settings.make_runs(), folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
     )
-    check_study(study)  # before the manifest names it
-    if tune:
-        with report_interrupts("interrupted while tuning; finished runs are stored; rerun the command to continue"):
-            settings = tune_solvers(study, settings, tune, say)
-        study = replace(study, tasks=settings.tasks())
-    write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
+    study.check()  # before the folder names it
+    write_command(out, settings, describe_command())
     gaps = LiveGaps()
-    with show_progress("runs", len(study.tasks)) as advance:
+    with show_progress("runs", len(study.runs)) as advance:
         try:
             return run_study(
                 study,
-                progress=lambda _, record: advance(gaps.add(record)),
+                progress=lambda record: advance(gaps.add(record)),
                 on_stored=lambda count: advance("stored", count),
-                on_outdated=say,
             )
         except Interrupted as interrupt:
             sentence = f"{interrupt.sentence}; finished runs are stored in {out}; {remedy}"
             raise KeyboardInterrupt(sentence) from interrupt
-
-
-def list_excluded(excluded: Sequence[str]) -> list[str]:
-    """Return sentences about records that are no evidence, and what to do; none if there are none."""
-    if not excluded:
-        return []
-    count = f"{len(excluded)} record{'s were' if len(excluded) > 1 else ' was'} excluded"
-    if len(excluded) > MOST_EXCLUDED:
-        count += f" ({len(excluded) - MOST_EXCLUDED} more are in the report)"
-    named = [f"excluded {sentence}" for sentence in excluded[:MOST_EXCLUDED]]
-    return [*named, f"{count}; delete what is named, and rerun the study to compute it again"]
 
 
 def summarise_problems(comparisons: Sequence[Comparison]) -> dict[str, Any]:
@@ -208,12 +180,14 @@ def summarise_problems(comparisons: Sequence[Comparison]) -> dict[str, Any]:
     return {comparison.problem: summarise(comparison) for comparison in comparisons}
 
 
-ENCODED = "problem solver run claimed_objective claimed_violation failed_evaluations status x verdict".split()
+ENCODED = (
+    "problem solver run status reported_objective x objective violation feasible violated failed_evaluations".split()
+)
 
 
 def _encode_run(record: RunRecord) -> dict[str, Any]:
     plain = record.to_json()
-    costs = {"evaluations": plain["evaluations"]["f"], "time_s": plain["time_s"]["solve"]}
+    costs = {"evaluations": plain["counts"].get("f"), "time_s": plain["time_s"]["solve"]}
     return {**{key: plain[key] for key in ENCODED}, "seed": record.seed, **costs}
 
 
@@ -224,8 +198,8 @@ def _tabulate_runs(comparisons: Sequence[Comparison]) -> Iterator[Rows]:
             continue
         rows = []
         for run in comparison.records:
-            objective = with_unit(run.verdict.objective, comparison.objective.unit)
-            violation = f"{run.verdict.violation:.3g}"
+            objective = with_unit(run.objective, comparison.objective.unit)
+            violation = f"{run.violation:.3g}"
             rows.append((run.solver, str(run.run), str(run.seed), objective, violation, run.status))
         header = ("solver", "run", "seed", comparison.objective.name, "violation", "status")
         yield Rows(f"{comparison.problem}: runs", header, rows)

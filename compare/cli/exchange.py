@@ -6,22 +6,24 @@ from typing import Annotated
 from typer import Argument, Option
 
 from compare.analysis.comparison import compare_problems
-from compare.archive import pack_study, verify_archive, verify_folder
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
-from compare.cli.compare import describe_summaries, list_excluded, summarise_problems
+from compare.cli.compare import describe_summaries, summarise_problems
 from compare.cli.options import RESULTS, Code, NamedProblem, name_all, parse_number
-from compare.cli.printing import Output, show_progress
+from compare.cli.printing import Output, Rows, show_progress
 from compare.report import renew_report, write_report
-from compare.study.evidence import read_evidence
 from compare.study.import_runs import import_runs
-from compare.study.record_files import write_records
-from compare.study.settings import read_manifest
+from compare.study.pack import pack_study, unpack_archive
+from compare.study.study import read_study_file, write_records
+from compare.study.verify import verify_study
+from nlp_gait.files import make_temporary_folder
 
 FINALS = "One row per run: the variables, and where known run, seed, objective, violation, evaluations, time_s."
 HISTORY = "Best so far: run, evaluations, objective and optionally time_s."
 EVALUATIONS = "Evaluations of every run, if neither file has them; leave it out if they are unknown."
-PACK = "Check the records of the folder, and pack the study for others."
-RERUN = "Runs to repeat, drawn at random, 0% to 100% (default: one of each solver and problem)."
+PACK = "Write the report, and pack the study for others."
+SHARE = "Runs to repeat, drawn at random; all by default."
+RUN_CODE = "Run user code that is packed in the archive: read it first."
+OUT = "Folder for the report and tables, written again from the records."
 
 
 @command
@@ -39,15 +41,18 @@ def import_results(
     Example: `nlp-gait import nao-ssp finals.csv --history histories.csv --as "GA (MATLAB)" --out study`
     """
     spec = problem.spec()
-    records = import_runs(spec, finals, label, history, evaluations)
-    kept = write_records(records, out)
-    evidence, report = renew_report(out)
-    shown = compare_problems([record for record in evidence.records if record.problem == spec.title])
+    with show_progress("rows", None) as advance:
+        imported = import_runs(
+            spec, finals, label, history, evaluations, lambda done, total: advance(f"{done} of {total}")
+        )
+    kept = write_records(imported, out)
+    records, damaged, report = renew_report(out)
+    shown = compare_problems([record for record in records if record.problem == spec.title])
     return Output(
         data={"problems": summarise_problems(shown)},
         parts=list(describe_summaries(shown)),
         written=[*report, *kept],
-        failures=list_excluded(evidence.sentences),
+        failures=damaged,
     )
 
 
@@ -56,43 +61,40 @@ def verify(
     *,
     study: Annotated[Path, Argument(metavar="DIR_OR_ZIP", help="Folder of a study, or its archive.")],
     pack: Annotated[Path | None, Option(metavar="FILE.zip", help=PACK), OUTPUT_FILE] = None,
-    rerun: Annotated[str | None, Option(metavar="SHARE", help=RERUN)] = None,
+    share: Annotated[str, Option(metavar="SHARE", help=SHARE)] = "100%",
+    run_code: Annotated[bool, Option("--run-code", help=RUN_CODE)] = False,
     code: Code = None,
+    out: Annotated[Path | None, Option(help=OUT), OUTPUT] = None,
 ) -> Output:
-    """Check a study: evaluate every point, repeat random runs, write the report again, compare planned runs, proofs and hashes.
+    """Check a study: evaluate every point again, repeat its runs, and write its report and tables again.
 
-    Prints what holds, what does not and what was not checked; the exit status is 1 if anything does not hold. Times are as
-    recorded. User code runs only if named with --code.
+    Lists what differs, what is missing and what was not repeated; the exit status is 1 if anything differs or is missing. User
+    code runs only if it is named with --code, or packed and allowed by --run-code.
 
-    With `--pack` the records are checked, the report is rewritten, and both are packed with user code, robots, certificates,
-    versions, hashes and how to repeat the study; `nlp-gait verify FILE.zip` checks the archive on any machine.
+    With `--pack` the study is packed with its report and the user's files; `nlp-gait verify FILE.zip` checks it on any machine.
 
-    Examples: `nlp-gait verify results`, `nlp-gait verify results --pack study.zip`, `nlp-gait verify study.zip --rerun 5%`
+    Examples: `nlp-gait verify results`, `nlp-gait verify results --pack study.zip`, `nlp-gait verify study.zip --share 20%`
     """
-    share = None
-    if rerun is not None:
-        share = parse_number("the share", rerun.removesuffix("%"), "--rerun", least=0.0, most=100.0) / 100.0
+    part = parse_number("the share", share.removesuffix("%"), "--share", least=0.0, most=100.0) / 100.0
     name_all(code)
     if pack is not None:
-        return _pack(study, pack)
-    with show_progress("repeated runs", None) as advance:
-        check = verify_folder if study.is_dir() else verify_archive
-        verification = check(study, share=share, progress=advance)
-    findings = verification.findings
-    wrong = [finding for finding in findings if finding.holds is False]
+        records, damaged, _ = renew_report(study)
+        written = [] if damaged else [pack_study(study, records, pack)]
+        return Output(data={"records": len(records)}, written=written, failures=damaged)
+    with make_temporary_folder("nlp-gait-verify-") as folder:
+        if not study.is_dir():
+            unpack_archive(study, folder)
+        place = study if study.is_dir() else folder
+        with show_progress("repeated runs", None) as advance:
+            result = verify_study(
+                place, share=part, run_code=run_code, progress=lambda done, total: advance(f"{done} of {total}")
+            )
+        written = write_report(out, result.records, read_study_file(place)) if out else []
+    rows = [(row.what, row.kind, row.why) for row in result.rows]
     return Output(
-        data={"holds": not wrong, "findings": [finding._asdict() for finding in findings], "scope": verification.scope},
-        parts=[finding.sentence for finding in findings],
-        answer=verification.scope,
-        failures=[f"{len(wrong)} of {len(findings)} checks do not hold"] if wrong else [],
+        data={"holds": result.holds, "sentence": result.sentence, "rows": [row._asdict() for row in result.rows]},
+        parts=[Rows("differences", ("what", "", "why"), rows)] if rows else [],
+        written=written,
+        answer=[result.sentence],
+        failures=[] if result.holds else ["the study does not follow from its inputs, see the table"],
     )
-
-
-def _pack(folder: Path, target: Path) -> Output:
-    evidence = read_evidence(folder)  # verification of the archive judges all points between the samples
-    failures = list_excluded(evidence.sentences)
-    if failures:
-        return Output(data={"records": 0}, failures=failures)
-    write_report(folder, evidence.records, read_manifest(folder))
-    written = [pack_study(folder, evidence.records, target)]
-    return Output(data={"records": len(evidence.records)}, written=written)

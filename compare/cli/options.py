@@ -12,7 +12,7 @@ from typer import Argument, Option
 
 from compare.cli.command import OUTPUT, SESSION
 from compare.study.record import load_result_or_record
-from compare.study.task import ProblemSpec
+from compare.study.run import ProblemSpec
 from nlp_gait.errors import InputError, describe_type, unknown
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.formulation.registry import find_maker
@@ -30,8 +30,6 @@ Jobs = Annotated[int | None, Option(min=1, max=4096, help="Worker processes (def
 Scheduler = Annotated[
     str | None, Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead."), SESSION
 ]
-TUNE = "Tune the settings of each search by N trials on training instances first, with Optuna; show NAME-tuned beside NAME."
-Tune = Annotated[int, Option(metavar="N", min=0, max=1000, help=TUNE)]
 OutFolder = Annotated[Path, Option(help="Folder for report, tables, figures, data and stored results."), OUTPUT]
 CODE = "Your code that the file refers to; it runs only if named here; repeatable."
 Code = Annotated[list[str] | None, Option(metavar="FILE.py:NAME", help=CODE), SESSION]
@@ -127,9 +125,7 @@ def name_all(code: Sequence[str] | None) -> None:
     for text in code or ():
         if not is_reference(text):
             raise InputError(f"--code takes FILE.py:NAME, MODULE:NAME or cmd:COMMAND, got {text!r}")
-        allow_code(text, "problem")
-        allow_code(text, "algorithm")
-        allow_code(text, "limit")
+        allow_code(text)
 
 
 def parse_names(text: str) -> list[str]:

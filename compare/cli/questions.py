@@ -8,15 +8,15 @@ from typer import Option
 
 from compare.cli import options
 from compare.cli.command import CONTINUE, command, describe_stored
-from compare.cli.printing import Output, Rows, describe_command, say, show_progress
+from compare.cli.printing import Output, Rows, describe_command, show_progress
 from compare.questions.certainty import Certainty, search_point
 from compare.questions.pareto.pareto import Pareto, parse_searches
 from compare.questions.prices import Prices
 from compare.questions.question import Question, Work
 from compare.questions.sweep import Sweep, parse_axis
 from compare.report.document import Table, iterate_leaves
-from compare.report.writing import add_session
-from compare.study.store import Store
+from compare.report.writing import add_origin
+from compare.study.memo import Memo
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError, OutputError
 from nlp_gait.files import make_writable_folder
@@ -135,8 +135,6 @@ def sweep(
 ) -> Output:
     """Solve a problem over a grid of parameter values or fixed variables, each point from its neighbour.
 
-    Rerun the command to continue after an interruption.
-
     With speeds as an axis the objective of a walking cycle is its power. Simulations are open loop.
 
     Examples: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`,
@@ -164,8 +162,7 @@ def run_question(question: Question[Any], out: Path) -> Output:
             advance(note)
 
         try:
-            store = Store(out, say)
-            for partial in question.find(Work(store=store, progress=progress)):
+            for partial in question.find(Work(memo=Memo(out), progress=progress)):
                 findings = partial
         except KeyboardInterrupt as interrupt:
             done = "" if question.total is None else f" after {notes} of {question.total} {question.counts}"
@@ -176,7 +173,7 @@ def run_question(question: Question[Any], out: Path) -> Output:
     written, failures = list[Path](), list[str]()
     with defer_interrupts() as pressed:
         try:
-            written = add_session(answer, describe_command(), problems).write(out)
+            written = add_origin(answer, describe_command(), problems).write(out)
         except OutputError as error:
             failures.append(str(error))
     if pressed() and not stopped:

@@ -8,7 +8,6 @@ from typer import Argument, Option
 from compare.analysis.comparison import compare_problems
 from compare.analysis.headline import describe_unknown
 from compare.cli.command import OUTPUT, command, describe_stored
-from compare.cli.compare import list_excluded
 from compare.cli.options import Code, Scheduler, name_all
 from compare.cli.printing import Output, describe_command, say, show_progress
 from compare.logs import write_ioh
@@ -43,9 +42,8 @@ def report(
 ) -> Output:
     """Rewrite a study's report from all records of its folder, without running a solver.
 
-    It has the runs that `study.json` lists: of each problem and solver those of the latest command that ran it. Every point is
-    evaluated again. Records whose numbers do not follow from it, or that contradict a proof, are excluded; then the exit status
-    is 1.
+    It has the runs that `study.json` lists: of each problem and solver those of the latest command that ran it. Damaged records
+    are left out and named; then the exit status is 1. `nlp-gait verify` computes a study again.
 
     With `--watch` the report follows a running study until Ctrl-C.
 
@@ -56,14 +54,14 @@ def report(
         say(f"open {folder / 'report.html'}; it follows the study in {folder} until Ctrl-C")
         watch_report(folder, lambda: renew_report(folder))
     further = FurtherFiles(csv=csv, latex=latex or digits is not None, decimals=digits, figures=figures)
-    evidence, written = renew_report(folder, further)
+    records, damaged, written = renew_report(folder, further)
     if logs:
-        comparisons = compare_problems(evidence.records)
+        comparisons = compare_problems(records)
         for sentence in (s for comparison in comparisons for s in describe_unknown(comparison)):
             say(f"not in the logs: {sentence}")
         write_ioh(comparisons, folder / "logs")
         written.append(folder / "logs")
-    return Output(data={"excluded": evidence.sentences}, written=written, failures=list_excluded(evidence.sentences))
+    return Output(data={"damaged": damaged}, written=written, failures=damaged)
 
 
 @command
@@ -90,7 +88,7 @@ def reproduce(
         chosen = read_dataclass(type(reproduction.full), effort, "effort", error=InputError)
     try:
         with show_progress(paper, None) as advance:
-            runner = Runner(folder=out, progress=advance, scheduler=scheduler, on_outdated=say)
+            runner = Runner(folder=out, progress=advance, scheduler=scheduler)
             reproduction.reproduce(runner, chosen, describe_command())
     except KeyboardInterrupt:
         return Output(data={}, interrupted=f"interrupted; {describe_stored(out)}")

@@ -33,8 +33,8 @@ from compare.papers.paper_runs import Effort, Runner, tabulate, tabulate_runs
 from compare.papers.rules import ClaimRow, Found, Ruling, decide, describe
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, make_text_table
 from compare.report.provenance import TERMS, format_settings, make_reference_table, make_solver_table
-from compare.report.writing import make_citation_section, make_session_section, write_document
-from compare.study.settings import Session
+from compare.report.writing import make_citation_section, make_own_version_table, write_document
+from compare.study.record import format_now, list_versions
 from nlp_gait.files import make_writable_folder, write_json
 
 E = TypeVar("E", bound=Effort)
@@ -170,7 +170,6 @@ class Paper(Generic[E, R]):
             OutputError: the folder cannot be written to.
         """
         folder = make_writable_folder(runner.folder)
-        session = Session.begin(command, runner.scheduler or str(runner.jobs))
         results = self.compute(runner, effort)
         runner.progress("figure, tables and report")
         judged = self.judge(results, effort)
@@ -180,7 +179,7 @@ class Paper(Generic[E, R]):
         record = {
             "effort": label,
             "settings": {k: v for k, v in asdict(effort).items() if v != getattr(self.full, k)},
-            "session": asdict(session),
+            "made": {"command": command, "date": format_now(), **list_versions()},
             "verdicts": verdicts,
             "parts": [encode_part(part) for part in parts],
         }
@@ -189,7 +188,8 @@ class Paper(Generic[E, R]):
         tables = (make_reference_table(runner.records), make_solver_table(runner.records)) if runner.records else ()
         origin = (make_text_table(("effort", "value"), settings, prose=True), TERMS, *tables)
         ending = Section(
-            title="Versions, machine, seeds and settings", parts=(*origin, make_session_section(1, session))
+            title="Versions, machine, seeds and settings",
+            parts=(*origin, make_own_version_table(command)),
         )
         cited = make_citation_section(record.inputs.problem for record in runner.records)
         title = self.title if label == "full" else f"{self.title} ({label})"

@@ -5,20 +5,18 @@ from dataclasses import dataclass, field
 from functools import cache, partial
 from itertools import count, product
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from compare.report.document import Table, Value
+from compare.study.memo import Computation, Memo
 from compare.study.record import RunRecord, group_by
-from compare.study.record_files import locate_record
-from compare.study.run_study import Study, run_study
-from compare.study.store import Computation, Store
-from compare.study.task import IPOPT, ProblemSpec, Stop, Task
+from compare.study.run import IPOPT, ProblemSpec, Run, Stop
+from compare.study.study import RECORDS, Study, name_record, run_study
 from metaheuristics.interface import Algorithm
 from nlp_gait.backends.exact import ExactModel, build_exact_model
-from nlp_gait.backends.identity import fingerprint
+from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
@@ -43,60 +41,58 @@ class Runner:
     progress: Progress = ignore_progress  # receives a line for each run and each computation
     jobs: int = field(default_factory=available_cores)  # worker processes; 1 runs in this process
     scheduler: str | None = None  # address of a Dask scheduler for the runs; other computations stay on this machine
-    on_outdated: Progress = ignore_progress  # receives a line for each solver whose stored runs are recomputed
     records: list[RunRecord] = field(default_factory=list)  # of all tasks, filled by ``run_tasks``
 
-    def run_tasks(self, tasks: Iterable[Task]) -> Runs:
+    def run_tasks(self, tasks: Iterable[Run]) -> Runs:
         """Run tasks with different titles, and return their records.
 
         Raises:
             InputError: a run failed before it had a point.
         """
-        study = Study(tasks=tuple(tasks), folder=self.folder, jobs=self.jobs, scheduler=self.scheduler)
+        study = Study(runs=tuple(tasks), folder=self.folder, jobs=self.jobs, scheduler=self.scheduler)
         finished, runs = count(1), Runs()
         records = run_study(
             study,
-            lambda task, _: self.progress(f"{next(finished)}: {task.problem.title}, {task.title} {task.run}"),
-            lambda stored: self.progress(f"{len(study.tasks)} runs, {stored} of them stored by an earlier call"),
-            self.on_outdated,
+            lambda record: self.progress(f"{next(finished)} of {len(study.runs)}: {record.name}"),
+            lambda stored: self.progress(f"{len(study.runs)} runs, {stored} of them stored by an earlier call"),
         )
-        for task, record in zip(study.tasks, records, strict=True):
+        for record in records:
             if not record.x:
-                file = locate_record(self.folder, task)
-                raise InputError(f"{file.parent.name}/{file.stem} {record.status}; fix this and delete {str(file)!r}")
+                file = self.folder / RECORDS / f"{name_record(record)}.json"
+                raise InputError(f"{record.name} {record.status}; fix this and delete {str(file)!r}")
             runs.setdefault((record.problem, record.solver), []).append(record)
         self.records.extend(records)
         return runs
 
-    def compute(self, computations: Sequence[Computation], code: Sequence[ModuleType]) -> dict[str, Any]:
-        """Return results by name; they are recomputed when their inputs or the text of the code have changed."""
-        store = Store(self.folder)
-        return store.compute_all(computations, jobs=self.jobs, code=code, progress=self.progress)
+    def compute(self, computations: Iterable[tuple[str, Computation]]) -> dict[str, Any]:
+        """Return results by name; they are computed again when their inputs have changed."""
+        return Memo(self.folder).compute_all(dict(computations), jobs=self.jobs, progress=self.progress)
 
 
-def make_computation(name: str, spec: ProblemSpec, function: Callable[..., Any], **arguments: Any) -> Computation:
-    """Return a function of plain arguments as a computation, which depends on these and on a problem."""
-    inputs = {**fingerprint(spec.load()), **arguments}
-    return Computation(name=name, inputs=inputs, function=partial(function, **arguments))
+def make_computation(
+    name: str, spec: ProblemSpec, function: Callable[..., Any], **arguments: Any
+) -> tuple[str, Computation]:
+    """Return a name and a function of plain arguments as a computation, which depends on these and on a problem."""
+    return name, ({**identify_problem(spec.load()), **arguments}, partial(function, **arguments))
 
 
 def make_start_tasks(
     problem: ProblemSpec, count: int, *, seed: int = 0, settings: Mapping[str, Any] | None = None
-) -> list[Task]:
+) -> list[Run]:
     """Return tasks of IPOPT from random points, drawn from one seed as by ``nlp_gait.solve``."""
     model, rng = problem.load(), np.random.default_rng(seed)
     points = [model.by_name(model.start_point(rng)) for _ in range(count)]
     return [
-        Task(problem=problem, solver=IPOPT, settings=settings or {}, seed=seed, run=run, start=point)
+        Run(problem=problem, solver=IPOPT, settings=settings or {}, seed=seed, number=run, start=point)
         for run, point in enumerate(points)
     ]
 
 
-def make_search_tasks(problem: ProblemSpec, algorithms: Mapping[str, Algorithm], runs: int, budget: int) -> list[Task]:
+def make_search_tasks(problem: ProblemSpec, algorithms: Mapping[str, Algorithm], runs: int, budget: int) -> list[Run]:
     """Return tasks of searches by label; run k has seed k."""
     stop = Stop(evaluations=budget)
     searches = product(algorithms.items(), range(runs))
-    return [Task(problem=problem, solver=solver, label=label, stop=stop, run=k) for (label, solver), k in searches]
+    return [Run(problem=problem, solver=solver, label=label, stop=stop, number=k) for (label, solver), k in searches]
 
 
 @cache
@@ -130,7 +126,7 @@ def tabulate_runs(records: Iterable[RunRecord]) -> Table:
     rows = list[Mapping[str, Value]]()
     for (problem, solver), runs in sorted(groups.items()):
         if problem in searched:
-            ends = [run.verdict.objective for run in runs if run.verdict.feasible]
+            ends = [run.objective for run in runs if run.feasible]
             least, median, largest = np.percentile(ends, (0, 50, 100)).tolist() if ends else (None, None, None)
             row: dict[str, Value] = {"problem": problem, "solver": solver, "runs": len(runs), "feasible": len(ends)}
             row |= {"least": least, "median": median, "largest": largest, "unit": runs[0].inputs.objective.unit}
@@ -139,13 +135,11 @@ def tabulate_runs(records: Iterable[RunRecord]) -> Table:
 
 
 def choose_best(records: Iterable[RunRecord]) -> RunRecord:
-    """Return the best run: claimed ones come first, then feasible ones, both by objective, then the others by violation."""
+    """Return the best run: first those reported as feasible, then feasible ones, both by objective, then the least violation."""
 
     def rank(record: RunRecord) -> tuple[bool, bool, float]:
-        verdict = record.verdict
-        sign = record.inputs.objective.sign
-        by = sign * verdict.objective if verdict.feasible else verdict.violation
-        return not record.claimed, not verdict.feasible, by
+        by = record.inputs.objective.sign * record.objective if record.feasible else record.violation
+        return not record.reported_feasible, not record.feasible, by
 
     return min(records, key=rank)
 

@@ -1,7 +1,6 @@
 """Evidence that the best known optimum is the global one: what is proven, and what is only supported."""
 
 import math
-import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -14,10 +13,10 @@ from compare.analysis.units import with_unit
 from compare.questions.question import Answer, Question, Work
 from compare.report.document import make_text_table
 from compare.study.references import find_reference
-from compare.study.task import describe_problem
+from compare.study.run import describe_problem
 from metaheuristics.minimize import minimize
 from metaheuristics.registry import make_algorithm
-from nlp_gait.backends.identity import fingerprint, hash_json, identify_problem, make_key
+from nlp_gait.backends.identity import hash_json, identify_problem, make_key
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
@@ -139,7 +138,7 @@ class Certainty(Question[FoundCertainty]):
             InputError: no start converged.
             CompilerError: a proof is requested and there is no compiler.
         """
-        problem, store = self.problem, work.store
+        problem, folder = self.problem, work.memo.folder
         ends = run_stored_starts(problem, work, starts=self.starts, seed=self.seed)
         optima = cluster_ends(problem, ends)
         if not optima:
@@ -150,12 +149,12 @@ class Certainty(Question[FoundCertainty]):
         reference = find_reference(identify_problem(problem))
         if reference.objective is not None and problem.objective.sign * (best - reference.objective) > 0.0:
             x = reference.x
-        identity = {**fingerprint(problem), "best": list(x)}
+        identity = {**identify_problem(problem), "best": list(x)}
         limits = {"tolerance": self.tolerance, "time_limit_s": self.time_limit_s}
 
         def prove() -> Certificate:
             name = f"proof-{hash_json({**make_key(identity), 'tolerance': self.tolerance})[:12]}.npz"
-            checkpoint = None if store.folder is None else store.folder / name
+            checkpoint = None if folder is None else folder / name
             return certify(problem, np.array(x), **limits, progress=work.progress, checkpoint=checkpoint)
 
         certificate = None
@@ -220,13 +219,13 @@ def run_stored_starts(
         raise InputError(f"starts must be at least 1, got {starts}")
     solver = solver or IpoptSettings()
     ready = solver.prepare(problem, starts)
-    identity = {**fingerprint(problem), "seed": seed, "settings": repr(solver)}
+    identity = {**identify_problem(problem), "seed": seed, "settings": repr(solver)}
     ends: list[StartEnd] = []
     for k, first in enumerate(range(0, starts, BATCH)):
         count = min(BATCH, starts - first)
         inputs = {**identity, "batch": k, "count": count}
         batch = partial(_run_batch, problem, ready, seed, k, count)
-        ends += work.compute(tuple[StartEnd, ...], f"starts-{first}", inputs, batch, code=[sys.modules[__name__]])
+        ends += work.compute(tuple[StartEnd, ...], f"starts-{first}", inputs, batch)
         work.progress(f"{len(ends)} starts")
     return ends
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from compare.study.task import ProblemSpec
+from compare.study.run import ProblemSpec
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.robots.perturbation import MASS, name_perturbed, split_name
 

@@ -22,7 +22,7 @@ from compare.drawing.figures import make_figure, use_style
 from compare.questions.perturbed_problem import get_quantity, is_mass, perturb_robot
 from compare.questions.question import Answer, Question, Work, make_record_table
 from compare.report.document import Figure, Part, make_text_table
-from nlp_gait.backends.identity import fingerprint
+from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, differentiate_by_models, differentiate_by_parameters
 from nlp_gait.backends.solve import Continuation, find_cheapest_feasible
@@ -233,9 +233,7 @@ class Prices(Question[FoundPrices]):
         """Yield the prices; InputError if there is no optimum, the solver has no multipliers, or the problem is too large."""
         problem = self.problem
         work.progress("solving")
-        near = find_cheapest_feasible(
-            Continuation(starts=self.starts, seed=self.seed, solver=work.solver(self.solver)).run(problem)
-        )
+        near = find_cheapest_feasible(Continuation(starts=self.starts, seed=self.seed, solver=self.solver).run(problem))
         if near is None:
             raise InputError(
                 f"{problem.name}: none of {self.starts} starts converged to a feasible point, so there is nothing to "
@@ -243,7 +241,7 @@ class Prices(Question[FoundPrices]):
             )
         optimum, solver = find_optimum(problem, near), self.solver or IpoptSettings()
         effort = {"starts": self.starts, "seed": self.seed, "solver": solver.name, "settings": solver.to_dict()}
-        inputs = {**fingerprint(problem), **effort}
+        inputs = {**identify_problem(problem), **effort}
         parameters: list[Price] = []
         robot: list[Price] = []
 

@@ -7,16 +7,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any, ClassVar, Generic, TypeVar
 
 from compare.analysis.best_known import describe_value
 from compare.report.document import Document, Table, Value, make_text_table
 from compare.report.writing import write_document
+from compare.study.memo import Memo
 from compare.study.references import find_reference
-from compare.study.store import Store, store_runs
 from nlp_gait.backends.identity import identify_problem
-from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decode_value
 from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import GaitProblem
@@ -30,31 +28,20 @@ F = TypeVar("F")
 class Work:
     """How a question stores its results and reports its progress; by default it does neither."""
 
-    store: Store = field(default_factory=Store)  #: of finished results
+    memo: Memo = field(default_factory=Memo)  #: of finished results
     progress: Progress = ignore_progress  #: receives a note after each step
 
-    def solver(self, solver: Solver | None = None) -> Solver:
-        """Return a solver that stores its finished runs; None for IPOPT with its defaults."""
-        return store_runs(self.store, solver)
+    def compute(self, kind: type[T], name: str, inputs: Mapping[str, Any], function: Callable[[], T]) -> T:
+        """Return the stored data class, or tuple of data classes, of a kind, or compute and store it, see ``Memo.compute``.
 
-    def compute(
-        self,
-        kind: type[T],
-        name: str,
-        inputs: Mapping[str, Any],
-        function: Callable[[], T],
-        code: Sequence[ModuleType] = (),
-    ) -> T:
-        """Return the stored data class, or tuple of data classes, of a kind, or compute and store it.
-
-        Arguments as for ``Store.compute``. Infinite numbers are not stored.
+        Infinite numbers are not stored.
         """
 
         def compute() -> Any:
             value: Any = function()
             return replace_nan([asdict(item) for item in value] if isinstance(value, tuple) else asdict(value))
 
-        stored: T = decode_value(kind, self.store.compute(name, inputs, compute, code=code), name)
+        stored: T = decode_value(kind, self.memo.compute(name, inputs, compute), name)
         return stored
 
 

@@ -17,7 +17,7 @@ from compare.questions.question import Answer, Question, Work, make_record_table
 from compare.questions.swept_walks import COST, SweepPoint, check_cycle, report_walks, simulate_walk
 from compare.report.document import Figure, make_text_table
 from compare.study.references import find_reference
-from compare.study.task import IPOPT, describe_problem
+from compare.study.run import IPOPT, describe_problem
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.solve import solve_both_ways
@@ -110,7 +110,6 @@ class Sweep(Question[list[SweepPoint]]):
                 [self.problem.place(place) for place in self._path],
                 starts=self.starts,
                 seed=self.seed,
-                solver=work.solver(),
                 progress=lambda: work.progress(""),
             )
         except Interrupted as error:

@@ -11,7 +11,7 @@ from compare.analysis.units import format_millimetres, list_units, make_axis_lab
 from compare.drawing.figures import make_figure, mark_values, use_style
 from compare.questions.question import Work, make_table
 from compare.report.document import Figure, Part
-from nlp_gait.backends.identity import fingerprint
+from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.simulation.drive import Drive
@@ -58,7 +58,7 @@ def check_cycle(problem: GaitProblem) -> None:
 
 def simulate_walk(result: Result, steps: int, work: Work) -> Walk:
     """Simulate so many steps of a gait in open loop; raises MissingExtraError without MuJoCo."""
-    inputs = {**fingerprint(result.problem), "x": result.x.tolist(), "steps": steps, "drive": repr(Drive())}
+    inputs = {**identify_problem(result.problem), "x": result.x.tolist(), "steps": steps, "drive": repr(Drive())}
     return work.compute(Walk, "walk", inputs, partial(_simulate_walk, result, steps))
 
 

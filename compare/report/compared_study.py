@@ -18,9 +18,8 @@ from compare.drawing.figures import share_looks
 from compare.report.latex import format_latex_overview, format_latex_table
 from compare.report.study_report import write_report
 from compare.study.record import RunRecord, make_frame
-from compare.study.run_study import Study, run_study
-from compare.study.settings import Manifest
-from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task
+from compare.study.run import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Run, Stop
+from compare.study.study import Study, StudyFile, run_study
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.notebook import format_html_table
@@ -76,7 +75,7 @@ class ComparedStudy:
 
     def report(self, folder: Path | str) -> Path:
         """Write the report to a folder and return its page; raises OutputError."""
-        return write_report(Path(folder), self.records, Manifest(settings=None, sessions=()))[0]
+        return write_report(Path(folder), self.records, StudyFile())[0]
 
     def _find(self, problem: str | None) -> Comparison:
         by_problem = {comparison.problem: comparison for comparison in self.comparisons}
@@ -109,7 +108,7 @@ def compare(
         out: folder of the records, from which the same call continues; None keeps them in memory.
 
     Raises:
-        InputError, UnknownNameError: there is nothing to run, or a solver or problem cannot run, see ``check_task``.
+        InputError, UnknownNameError: there is nothing to run, or a solver or problem cannot run, see ``check_run``.
     """
     if runs < 1 or starts < 0:
         raise InputError(f"runs must be at least 1 and starts at least 0, got {runs} and {starts}")
@@ -117,18 +116,18 @@ def compare(
     if starts and all(solver != IPOPT for _, solver in given):
         given.insert(0, ("", IPOPT))
     listed = [problems] if isinstance(problems, (str, GaitProblem, ProblemSpec)) else problems
-    tasks = [
-        Task(
+    planned = [
+        Run(
             problem=problem if isinstance(problem, ProblemSpec) else ProblemSpec(name=problem),
             solver=solver,
             label=label,
             stop=Stop(evaluations=evaluations),
             seed=seed,
-            run=run,
+            number=run,
         )
         for problem in listed
         for label, solver in given
         for run in range(starts if solver in GRADIENT_SOLVERS else runs)
     ]
-    study = Study(tasks=tuple(tasks), folder=None if out is None else Path(out), jobs=jobs)
+    study = Study(runs=tuple(planned), folder=None if out is None else Path(out), jobs=jobs)
     return ComparedStudy(records=run_study(study))

@@ -9,7 +9,7 @@ from compare.analysis.headline import MANY, write_overall_headline
 from compare.analysis.units import name_solver
 from compare.drawing.figures import share_looks
 from compare.judge import evaluate
-from compare.report.document import Document, Section, make_table_section
+from compare.report.document import Document
 from compare.report.study_files import FurtherFiles
 from compare.report.study_sections import (
     TESTS,
@@ -26,10 +26,9 @@ from compare.report.study_sections import (
     split_title,
 )
 from compare.report.writing import write_document
-from compare.study.evidence import CheckedRecords, Exclusion, read_evidence
 from compare.study.record import RunRecord, load_gait
-from compare.study.record_files import RECORDS, name_group
-from compare.study.settings import Manifest, Session, read_manifest
+from compare.study.study import FILE, RECORDS, StudyFile, name_group, read_records, read_study_file
+from nlp_gait.errors import InputError
 from nlp_gait.files import make_file_name, replace_nan, write_json, write_text
 
 REPORT_ALONE = FurtherFiles()
@@ -40,23 +39,27 @@ POLL_S = 2.0
 def write_report(
     folder: Path,
     records: Sequence[RunRecord],
-    manifest: Manifest,
+    file: StudyFile,
     *,
-    excluded: Sequence[Exclusion] = (),
     further: FurtherFiles = REPORT_ALONE,
 ) -> list[Path]:
-    """Write the report with stored simulations, its figures as SVG, and further files; return all paths."""
+    """Write the report, its figures as SVG, and further files; return all paths."""
     comparisons = compare_problems(records)
     with share_looks({name_solver(record.solver) for record in records}):
-        document = make_study_document(comparisons, manifest, excluded)
+        document = make_study_document(comparisons, file)
         written = write_document(folder, document)
         return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons, document)]
 
 
-def renew_report(folder: Path, further: FurtherFiles = REPORT_ALONE) -> tuple[CheckedRecords, list[Path]]:
-    """Check the records of a folder, write its report, and return both; raises as ``read_evidence``."""
-    evidence, manifest = read_evidence(folder), read_manifest(folder)
-    return evidence, write_report(folder, evidence.records, manifest, excluded=evidence.excluded, further=further)
+def renew_report(folder: Path, further: FurtherFiles = REPORT_ALONE) -> tuple[list[RunRecord], list[str], list[Path]]:
+    """Write the report of the records of a folder; return them, a sentence for each damaged one, and the files.
+
+    Raises InputError if there are no records, or all are damaged.
+    """
+    records, damaged = read_records(folder)
+    if not records:
+        raise InputError(f"none of the {len(damaged)} records in {str(folder)!r} can be read: {damaged[0]}")
+    return records, damaged, write_report(folder, records, read_study_file(folder), further=further)
 
 
 def watch_report(folder: Path, rewrite: Callable[[], object], sleep: Callable[[float], None] = time.sleep) -> None:
@@ -76,19 +79,17 @@ def watch_report(folder: Path, rewrite: Callable[[], object], sleep: Callable[[f
 
 def make_study_document(
     comparisons: Sequence[Comparison],
-    manifest: Manifest,
-    excluded: Sequence[Exclusion] = (),
+    file: StudyFile,
 ) -> Document:
-    """Return the document of a study, and of excluded records."""
+    """Return the document of a study."""
     gaits = {comparison.problem: load_gaits(comparison) for comparison in comparisons}
     problems = {comparison.problem: load_problem_or_none(comparison) for comparison in comparisons}
     titles = {comparison.problem: split_title(comparison, problems[comparison.problem]) for comparison in comparisons}
     return Document(
         title=_write_title(list(titles.values()), len({solver.name for c in comparisons for solver in c.solvers})),
         parts=(
-            *_describe_latest(manifest.sessions),
-            *_describe_progress(manifest, [r for c in comparisons for r in c.records], len(excluded)),
-            *_list_excluded(excluded),
+            *_describe_command(file, [r for c in comparisons for r in c.records]),
+            *_describe_progress(file, [r for c in comparisons for r in c.records]),
             *((write_overall_headline(comparisons), make_overview(comparisons)) if len(comparisons) >= MANY else ()),
             *(
                 make_problem_section(c, titles[c.problem][0], problems[c.problem], gaits[c.problem])
@@ -102,7 +103,7 @@ def make_study_document(
                 comparisons,
                 lambda c: list_optimum(c, gaits[c.problem]),
             ),
-            make_settings_section(comparisons, manifest.sessions),
+            make_settings_section(comparisons, file),
         ),
     )
 
@@ -116,31 +117,21 @@ def _write_title(titles: Sequence[tuple[str, str]], solvers: int) -> str:
     return f"{solvers} solvers on {len(titles)} problems" if goals else f"{goal[:1].upper()}{goal[1:]}"
 
 
-def _describe_latest(sessions: Sequence[Session]) -> tuple[str, ...]:
-    """Return date, version and command of the latest session."""
-    if not sessions:
-        return ()
-    session = sessions[-1]
-    return (f"{session.started[:10]}, version {session.versions.get('nlp-gait', 'unknown')}: {session.command}",)
+def _describe_command(file: StudyFile, records: Sequence[RunRecord]) -> tuple[str, ...]:
+    """Return date, version and command of the command that ran last."""
+    versions = dict.fromkeys(record.versions.get("nlp-gait", "unknown") for record in records)
+    return (f"{file.date[:10]}, version {', '.join(versions)}: {file.command}",) if file.command else ()
 
 
-def _describe_progress(manifest: Manifest, records: Sequence[RunRecord], excluded: int) -> tuple[str, ...]:
+def _describe_progress(file: StudyFile, records: Sequence[RunRecord]) -> tuple[str, ...]:
     """Return a sentence while runs of the latest command, or of the solvers in the report, are missing."""
     shown = {(record.problem, record.solver) for record in records}
-    if manifest.settings is not None:
-        shown |= {(task.problem.title, task.title) for task in manifest.settings.tasks()}
+    if (settings := file.read_settings(FILE)) is not None:
+        shown |= {(run.problem.title, run.title) for run in settings.make_runs()}
     groups = {name_group(*titles) for titles in shown}
-    planned = sum(name.rsplit("-", 2)[0] in groups for name in manifest.runs)
-    finished = len(records) + excluded
+    planned = sum(name.rsplit("-", 2)[0] in groups for name in file.runs)
+    finished = len(records)
     return (f"{finished} of {planned} runs have ended; all numbers are of these.",) if finished < planned else ()
-
-
-def _list_excluded(excluded: Sequence[Exclusion]) -> tuple[Section, ...]:
-    rows = [(exclusion.name, "; ".join(exclusion.reasons)) for exclusion in excluded]
-    words = (
-        "All numbers of records are evaluated again. These records are no evidence, and nothing below contains them."
-    )
-    return make_table_section("Excluded records", ("record", "reason"), rows, words, prose=True)
 
 
 def write_better_points(folder: Path, comparisons: Sequence[Comparison]) -> list[Path]:

@@ -16,9 +16,9 @@ from compare.drawing.gait_figure import GaitCurves, draw_gaits, make_gait_charts
 from compare.report.document import Figure, Part, Prose, Section, Table, make_table_section, make_text_table
 from compare.report.interactive import describe_gaits
 from compare.report.provenance import TERMS, format_settings, make_solver_table
-from compare.report.writing import escape_markdown, make_anchor, make_citation_section, make_session_section
-from compare.study.record import RunRecord, find_best, load_gait, load_problem
-from compare.study.settings import Session
+from compare.report.writing import escape_markdown, make_anchor, make_citation_section, make_version_table
+from compare.study.record import find_best, load_gait, load_problem
+from compare.study.study import StudyFile
 from nlp_gait.errors import GaitError
 from nlp_gait.files import make_file_name
 from nlp_gait.formulation import GaitProblem
@@ -89,7 +89,7 @@ def list_design(comparison: Comparison, problem: GaitProblem | None) -> tuple[Pa
         return ()
     units = {} if problem is None else {variable.name: variable.unit for variable in problem.variables}
     objective = comparison.objective
-    rows = [(objective.name.replace("_", " "), with_unit(best.verdict.objective, objective.unit))]
+    rows = [(objective.name.replace("_", " "), with_unit(best.objective, objective.unit))]
     for name, value in list(best.x.items())[:SHOWN_VARIABLES]:
         unit = units.get(name, "1")
         scale, shown = SCALES.get(unit, (1.0, unit))
@@ -167,9 +167,9 @@ def list_costs(comparison: Comparison) -> tuple[Part, ...]:
 
 def _list_failures(comparison: Comparison) -> tuple[Section, ...]:
     rows = [
-        (name_solver(r.solver), str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-")
+        (name_solver(r.solver), str(r.run), str(r.seed), r.status, "; ".join(r.violated[:5]) or "-")
         for r in comparison.records
-        if not r.verdict.feasible
+        if not r.feasible
     ]
     header = ("solver", "run", "seed", "status", "violated, worst first")
     return make_table_section("Runs that ended infeasible or failed", header, rows, prose=True)
@@ -247,22 +247,16 @@ def _describe_step(active: ActiveConstraint, unit: str) -> str:
 
 def _list_violated_between(comparison: Comparison) -> tuple[Section, ...]:
     rows = [
-        (name_solver(r.solver), str(r.run), "; ".join(r.verdict.violated[:3]) or "-", _describe_proof(r))
+        (name_solver(r.solver), str(r.run), "; ".join(r.violated[:3]) or "-")
         for r in comparison.records
-        if r.verdict.feasible and (r.verdict.dense_feasible is False or _describe_proof(r) != "-")
+        if r.feasible and r.feasible_between_samples is False
     ]
-    header = ("solver", "run", "violated on a dense grid, worst first", "proven at all times")
+    header = ("solver", "run", "violated on a dense grid, worst first")
     return make_table_section("Feasible at the samples, not at all times", header, rows, prose=True)
 
 
-def _describe_proof(record: RunRecord) -> str:
-    """Return what is violated between the samples, or not proven to be satisfied."""
-    proof = record.verdict.guaranteed
-    return "-" if proof is None or proof.satisfied or proof.reason else str(proof)
-
-
-def make_settings_section(comparisons: Sequence[Comparison], sessions: Sequence[Session]) -> Section:
-    """Return what the solvers report, how costs are counted, all settings, sessions, citations and terms."""
+def make_settings_section(comparisons: Sequence[Comparison], file: StudyFile) -> Section:
+    """Return what the solvers report, how costs are counted, all settings, versions, citations and terms."""
     sizes = [max((len(r.x) for r in c.records), default=0) for c in comparisons]
     weights = [
         (c.problem, *map("{:g}".format, list_weights(n).values())) for c, n in zip(comparisons, sizes, strict=True)
@@ -289,7 +283,7 @@ def make_settings_section(comparisons: Sequence[Comparison], sessions: Sequence[
             "separately, so gradient methods are never favoured; a gradient run reaches its targets at its end. A polished run "
             "includes the cost of its search. Times are wall times of the solve, without building or compiling",
         ),
-        *(make_session_section(number, session) for number, session in enumerate(sessions, start=1)),
+        make_version_table(file.command, file.date, (r.versions for c in comparisons for r in c.records)),
         make_citation_section(problems.values()),
         TERMS,
     )

@@ -15,7 +15,7 @@ from compare.drawing.figures import inline_svg
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, iterate_leaves, make_text_table
 from compare.report.provenance import explain
 from compare.study.citations import cite_problems
-from compare.study.settings import Session
+from compare.study.record import format_now, list_versions
 from nlp_gait.files import format_csv, write_text
 
 MARKDOWN = MarkdownIt("commonmark", {"html": False}).enable("table")
@@ -94,17 +94,18 @@ def escape_markdown(text: str) -> str:
 D = TypeVar("D", bound=Document)
 
 
-def make_session_section(number: int, session: Session) -> Section:
-    """Return the command, machine and versions of a session."""
-    rows = [
-        ("command", session.command),
-        ("started", session.started),
-        *session.machine.items(),
-        ("workers", session.jobs),
-        ("compiled objective", session.kernel),
-        ("versions", ", ".join(f"{name} {version}" for name, version in session.versions.items())),
-    ]
-    return Section(title=f"Session {number}", parts=(make_text_table(("what", "value"), rows, prose=True),))
+def make_version_table(command: str, date: str, versions: Iterable[Mapping[str, str]]) -> Table:
+    """Return the command, its date, and the versions of packages, compiler, processor and system, those that differ together."""
+    together: dict[str, list[str]] = {}
+    for name, version in dict.fromkeys(item for each in versions for item in each.items()):
+        together.setdefault(name, []).append(version)
+    rows = [("command", command), ("date", date), *((name, "; ".join(texts)) for name, texts in together.items())]
+    return make_text_table(("what", "value"), rows, prose=True)
+
+
+def make_own_version_table(command: str) -> Table:
+    """Return the same of this process, now."""
+    return make_version_table(command, format_now(), [list_versions()])
 
 
 def make_citation_section(problems: Iterable[Mapping[str, Any]]) -> Section:
@@ -114,7 +115,10 @@ def make_citation_section(problems: Iterable[Mapping[str, Any]]) -> Section:
     return Section(title="How to cite", parts=(Prose(f"{words}\n\n{entries}"),))
 
 
-def add_session(document: D, command: str, problems: Iterable[Mapping[str, Any]], jobs: str = "1") -> D:
-    """Return a document with the session that makes it (this command, machine and versions) and what to cite."""
-    ending = (make_session_section(1, Session.begin(command, jobs)), make_citation_section(problems))
+def add_origin(document: D, command: str, problems: Iterable[Mapping[str, Any]]) -> D:
+    """Return a document with this command, machine and versions, and what to cite."""
+    ending = (
+        Section(title="Versions", parts=(make_own_version_table(command),)),
+        make_citation_section(problems),
+    )
     return replace(document, parts=(*document.parts, *ending))

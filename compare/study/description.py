@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 from compare.study.citations import split_sections
-from compare.study.task import list_solvers
+from compare.study.run import list_solvers
 from metaheuristics.multi_objective import FRONT_ALGORITHMS
 from metaheuristics.registry import ADAPTERS, ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS

@@ -1,18 +1,18 @@
 """Results from elsewhere as records of a study: judged like all others; unknown values stay unknown."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from compare.judge import evaluate
-from compare.study.evidence import CheckedRecords, check_records
-from compare.study.record import History, RunRecord, Times, Verdict
-from compare.study.record_files import name_run, read_records
-from compare.study.settings import read_manifest
-from compare.study.task import LABEL, Inputs, ProblemSpec
+from compare.study.record import History, RunRecord, Times, describe_evaluation, list_versions
+from compare.study.references import SAME_VALUE, find_reference
+from compare.study.run import LABEL, Inputs, ProblemSpec
+from compare.study.study import read_records, read_study_file
 from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
 from nlp_gait.columns import CsvTable, read_table
 from nlp_gait.errors import InputError
@@ -22,6 +22,7 @@ from nlp_gait.formulation import Array, GaitProblem
 FINALS = ("run", "seed", "objective", "violation", "evaluations", "time_s")
 HISTORY = ("run", "evaluations", "objective")
 MOST_POINTS = 100_000
+ROUNDED = 1e-3  # relative difference of a history's end from the judged value that printed digits explain
 # Least values of those that are numbers, not counts.
 LEAST = {"objective": -math.inf, "violation": 0.0, "time_s": 0.0}
 
@@ -57,16 +58,22 @@ def read_points(path: Path, problem: GaitProblem, others: Sequence[str] = ()) ->
 
 
 def import_runs(
-    spec: ProblemSpec, finals: Path, label: str, histories: Path | None = None, evaluations: int | None = None
+    spec: ProblemSpec,
+    finals: Path,
+    label: str,
+    histories: Path | None = None,
+    evaluations: int | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[RunRecord]:
     """Return a record for each row of a file of final points; raises InputError for unreadable files and impossible values.
 
     Args:
         spec: the problem.
-        finals: one row for each run: the variables and, where known, ``FINALS``, of which objective and violation are claims.
+        finals: one row for each run: the variables and, where known, ``FINALS``, with objective and violation as reported.
         label: of the solver in the study.
         histories: best so far: ``HISTORY``, objective empty before the first feasible point, and optionally ``time_s``.
         evaluations: of every run, if neither file has them; None if they are unknown: such runs have no history.
+        progress: called with the number of rows that were evaluated and of all.
     """
     if not LABEL.fullmatch(label):
         raise InputError(f"--as takes letters, digits, spaces and . _ + : ( ) -, 64 at most, got {label!r}")
@@ -78,15 +85,17 @@ def import_runs(
         raise InputError(f"{table.owner}: a run is duplicated")
     stored = {} if histories is None else _read_histories(histories, runs)
     identity = identify_problem(problem)
+    bound = find_reference(identity).bound
     records = []
     for k, (run, x) in enumerate(zip(runs, points, strict=True)):
         row = {name: math.nan if column is None else column[k] for name, column in given.items()}
-        verdict = Verdict.from_evaluation(evaluate(problem, x))
+        judged = describe_evaluation(evaluate(problem, x, prove=False))
         for name, least in LEAST.items():
             table.number(name, k, row[name], least)
-        history, seconds = stored.get(run) or _make_history(table, k, row, verdict, evaluations)
+        history, seconds = stored.get(run) or _make_history(table, k, row, judged, evaluations)
+        history, seconds, cut = _cut_history(problem.objective.sign, history, seconds, judged, bound)
         solve = (time for time in (row["time_s"], *seconds[-1:]) if not math.isnan(time))
-        claim = None if math.isnan(row["objective"]) else row["objective"]
+        reported = None if math.isnan(row["objective"]) else row["objective"]
         seed = run if math.isnan(row["seed"]) else table.count("seed", k, row["seed"])
         content = [x.tolist(), {name: repr(value) for name, value in row.items()}, asdict(history), repr(seconds)]
         records.append(
@@ -98,27 +107,27 @@ def import_runs(
                     problem=identity,
                     objective=problem.objective,
                     solver=label,
-                    settings={},
                     seed=seed,
                     imported=hash_json(content),
                 ),
                 settings={"kind": "imported", "file": finals.name},
-                status=f"imported from {finals.name}",
-                claimed=claim is not None and not row["violation"] > 0.0,
+                status=f"imported from {finals.name}{cut}",
+                reported_feasible=reported is not None and not row["violation"] > 0.0,
                 x=problem.by_name(x),
-                claimed_objective=claim,
-                claimed_violation=None if math.isnan(row["violation"]) else row["violation"],
-                verdict=verdict,
-                evaluations={"f": history.evaluations[-1]} if history.evaluations else {},
+                reported_objective=reported,
+                **judged,
+                counts={"f": history.evaluations[-1]} if history.evaluations else {},
                 history=history,
                 time_s=Times(solve=next(solve, math.nan), history=seconds),
+                versions=list_versions(),
             )
         )
+        progress(k + 1, len(points))
     return records
 
 
 def _make_history(
-    table: CsvTable, k: int, row: Mapping[str, float], verdict: Verdict, evaluations: int | None
+    table: CsvTable, k: int, row: Mapping[str, float], judged: Mapping[str, Any], evaluations: int | None
 ) -> tuple[History, tuple[float, ...]]:
     """Return the end of a run alone as its history and its time; empty if the number of evaluations is unknown."""
     count = row["evaluations"]
@@ -126,8 +135,36 @@ def _make_history(
         if evaluations is None:
             return History(), ()
         count = evaluations
-    end = verdict.objective if verdict.feasible else None
+    end = judged["objective"] if judged["feasible"] else None
     return History(evaluations=(table.count("evaluations", k, count, 1),), objective=(end,)), (row["time_s"],)
+
+
+def _cut_history(
+    sign: float, history: History, seconds: tuple[float, ...], judged: Mapping[str, Any], bound: float | None
+) -> tuple[History, tuple[float, ...], str]:
+    """Return a history without values that its run cannot have had, and a sentence about them.
+
+    No value may be better than the run's judged end, beyond the digits of imported files, or than a proven bound.
+    """
+    end = judged["objective"] if judged["feasible"] else math.nan
+    best = sign * end - ROUNDED * abs(end) if judged["feasible"] else math.inf
+    least = best if bound is None else max(best, sign * bound - SAME_VALUE * abs(bound))
+    wrong = [k for k, value in enumerate(history.objective) if value is not None and sign * value < least]
+    if not wrong:
+        return history, seconds, ""
+    kept = [k for k in range(len(history.objective)) if k not in set(wrong)]
+    cut = History(
+        evaluations=tuple(history.evaluations[k] for k in kept), objective=tuple(history.objective[k] for k in kept)
+    )
+    count, why = (
+        len(wrong),
+        "better than its point, or than the proven bound" if judged["feasible"] else "of no feasible point",
+    )
+    last = (history.evaluations[-1], end if judged["feasible"] else None)
+    if kept[-1:] != [len(history.objective) - 1]:  # its length stays, and its end is the judged one
+        cut = History(evaluations=(*cut.evaluations, last[0]), objective=(*cut.objective, last[1]))
+        kept.append(len(history.objective) - 1)
+    return cut, tuple(seconds[k] for k in kept), f"; {count} value{'s' * (count > 1)} of its history left out: {why}"
 
 
 def _read_histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tuple[float, ...]]]:
@@ -155,16 +192,13 @@ def _read_histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History,
     return {run: (History(evaluations=counts, objective=f), times) for run, (counts, f, times) in courses.items()}
 
 
-def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> CheckedRecords:
-    """Return the checked imported records in a folder whose problems are those of some records."""
-    if not set(read_manifest(folder).runs).difference(name_run(r) for r in records if not r.inputs.imported):
-        return CheckedRecords([], [])
+def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> list[RunRecord]:
+    """Return the imported records in a folder whose problems are those of some records."""
     problems = {record.problem: record.inputs.problem for record in records}
-    imported = [
+    return [
         record
-        for record in read_records(folder)
+        for record in (read_records(folder)[0] if read_study_file(folder).runs else ())
         if record.inputs.imported
         and record.problem in problems
         and not describe_difference(record.inputs.problem, problems[record.problem])
     ]
-    return check_records(imported)

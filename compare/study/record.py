@@ -1,7 +1,6 @@
 """One finished run, as plain data, as a JSON file, and as a row of a table: the only place that knows the schema.
 
-A new field of a record needs one line in ``RunRecord``, where the run fills it in (``run_task.py``), and ``SCHEMA`` + 1.
-What differs when a run is repeated belongs to ``Times`` or ``Origin``, which ``verify`` does not compare.
+A new field of a record needs one line in ``RunRecord``, where the run fills it in (``perform.py``), and ``SCHEMA`` + 1.
 """
 
 from __future__ import annotations
@@ -9,33 +8,38 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import platform
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
+from datetime import UTC, datetime
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
 from compare.judge import Evaluation
-from compare.study.origin import Origin, format_now
-from compare.study.task import LABEL, Inputs, ProblemSpec, Task
+from compare.study.run import LABEL, Inputs, ProblemSpec
+from nlp_gait import __version__
+from nlp_gait.backends.kernel.compiler import find_compiler, read_cpu_info
 from nlp_gait.decoding import decode
-from nlp_gait.errors import InputError
+from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import LARGEST_FILE, check_plain, convert_errors, read_json, replace_nan
 from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
 from nlp_gait.notebook import import_pandas
-from nlp_gait.proofs.guarantee import Guarantee
 
 T = TypeVar("T")
 K = TypeVar("K")
 
-SCHEMA = 5
-OPTIONAL = {"origin", "finished"}  # fields that a file may lack
+SCHEMA = 6
 REMEDY = "delete it to have the run repeated"
 CALLS = tuple(kind.name for kind in fields(Evaluations))
-CLAIMED = ("problem", "solver", "run", "seed", "claimed", "status", "claimed_objective", "claimed_violation")
+PACKAGES = ("casadi", "numpy", "scipy", "cma", "pymoo", "distributed")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +52,7 @@ class History:
 
 @dataclass(frozen=True, kw_only=True)
 class Times:
-    """Wall times [s], the only difference between two equal runs; NaN if unknown."""
+    """Wall times [s], which differ when a run is repeated; NaN if unknown."""
 
     build: float = math.nan  #: of the symbolic problem and NLP; near 0 if the process had them already
     compile: float = math.nan  #: of the objective, or of derivatives and solver; likewise
@@ -58,39 +62,9 @@ class Times:
     finished: str = ""  #: date and time of the end of the run, UTC; empty if unknown
 
 
-@dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """The judge's verdict on the point of a run; by default that on a run without a point."""
-
-    objective: float = math.nan  #: exact value, in the problem's sense
-    violation: float = math.inf  #: exact total violation
-    feasible: bool = False  #: at the problem's samples
-    indexes: Mapping[str, float] = field(default_factory=dict)
-    dense: Mapping[str, float] | None = None  #: the same on the dense grid; None without one
-    dense_feasible: bool | None = None  #: whether all rows are satisfied on the dense grid; None without one
-    #: Names of the worst violated rows with their violation, those at the problem's samples first
-    violated: tuple[str, ...] = ()
-    guaranteed: Guarantee | None = None  #: what is proven between the samples; None if the point is infeasible
-
-    @classmethod
-    def from_evaluation(cls, evaluation: Evaluation) -> Verdict:
-        """Return the verdict of an evaluation."""
-        worst = [*evaluation.violations[:5], *evaluation.dense_violations[:5]]
-        return cls(
-            objective=float(evaluation.objective["value"]),
-            violation=evaluation.violation,
-            feasible=evaluation.feasible,
-            indexes=evaluation.indexes,
-            dense=evaluation.dense,
-            dense_feasible=None if evaluation.dense is None else not evaluation.dense_violations,
-            violated=tuple(f"{row.name} by {row.violation:.3g} {row.unit}".removesuffix(" 1") for row in worst),
-            guaranteed=evaluation.guaranteed,
-        )
-
-
 @dataclass(frozen=True, kw_only=True, repr=False)
 class RunRecord:
-    """One run of a solver on a problem: the claim, the judge's verdict, the cost."""
+    """One run of a solver on a problem: what the solver reported, what the judge computed at its point, and the cost."""
 
     problem: str  #: label, or name without one
     solver: str  #: label, or name without one
@@ -98,39 +72,25 @@ class RunRecord:
     inputs: Inputs  #: everything that the result depends on
     status: str = ""  #: why the run ended, in words
     settings: Mapping[str, Any] = field(default_factory=dict)  #: of the solver, defaults included
-    claimed: bool = False  #: whether the solver claims a feasible result
+    reported_feasible: bool = False  #: whether the solver reports a feasible result
+    reported_objective: float | None = None  #: in the problem's sense; None without a report
     x: Mapping[str, float] = field(default_factory=dict)  #: by variable name; empty without a point
-    claimed_objective: float | None = None  #: in the problem's sense; None without a claim
-    claimed_violation: float | None = None  #: total; None without a claim
-    verdict: Verdict = Verdict()  #: what the judge finds at x
+    objective: float = math.nan  #: exact value at x, in the problem's sense
+    violation: float = math.inf  #: exact total violation at x
+    feasible: bool = False  #: at the problem's samples
+    metrics: Mapping[str, float] = field(default_factory=dict)  #: performance figures at x
+    feasible_between_samples: bool | None = None  #: on the dense grid; None without one
+    #: Names of the worst violated constraints with their violation, those at the problem's samples first
+    violated: tuple[str, ...] = ()
     #: Calls by kind: f (with all constraints), g, gradient, jacobian, hessian; empty for an imported result without counts
-    evaluations: Mapping[str, int] = field(default_factory=dict)
+    counts: Mapping[str, int] = field(default_factory=dict)
     failed_evaluations: int = 0  #: calls that returned NaN or infinity
     iterations: int = 0  #: generations of a population, iterations of an NLP solver
     #: Bounds with a price, largest first, from solvers with multipliers
     active_constraints: tuple[ActiveConstraint, ...] = ()
     history: History = History()
     time_s: Times = Times()
-    origin: Origin | None = None  #: of this run; None for imported results
-
-    @classmethod
-    def from_task(cls, task: Task, *, time_s: Times, **results: Any) -> RunRecord:
-        """Return the record of a task with the results of its run, which ends now: the fields from ``status`` on."""
-        return cls(
-            problem=task.problem.title,
-            solver=task.title,
-            run=task.run,
-            inputs=task.inputs(),
-            time_s=replace(time_s, finished=format_now()),
-            origin=Origin.make(),
-            **results,
-        )
-
-    @classmethod
-    def make_failed(cls, task: Task, reason: str) -> RunRecord:
-        """Return the record of a run without a result."""
-        times = Times(build=0.0, compile=0.0, solve=0.0, objective=0.0)
-        return cls.from_task(task, status=f"failed: {reason}", evaluations={"f": 0}, time_s=times)
+    versions: Mapping[str, str] = field(default_factory=dict)  #: of packages, compiler, processor and system
 
     @property
     def seed(self) -> int:
@@ -140,15 +100,20 @@ class RunRecord:
     @property
     def cost(self) -> float:
         """The judge's objective, to be minimised; infinite where the run is not feasible."""
-        return self.inputs.objective.sign * self.verdict.objective if self.verdict.feasible else math.inf
+        return self.inputs.objective.sign * self.objective if self.feasible else math.inf
+
+    @property
+    def name(self) -> str:
+        """Problem, solver and run, for messages."""
+        return f"{self.problem}, {self.solver}, run {self.run}"
 
     @property
     def objective_text(self) -> str:
         """The judge's objective, for example ``power 0.845869 W``."""
-        if not self.verdict.feasible:
+        if not self.feasible:
             return "infeasible"
         objective = self.inputs.objective
-        return f"{objective.name} {self.verdict.objective:.6g} {objective.unit}".removesuffix(" 1")
+        return f"{objective.name} {self.objective:.6g} {objective.unit}".removesuffix(" 1")
 
     def __repr__(self) -> str:
         return f"<RunRecord of {self.solver} on {self.problem}, run {self.run}: {self.objective_text}>"
@@ -158,10 +123,44 @@ class RunRecord:
         return {"schema": SCHEMA, **replace_nan(self)}
 
 
+def describe_evaluation(evaluation: Evaluation) -> dict[str, Any]:
+    """Return what the judge found at a point, as fields of a record."""
+    worst = [*evaluation.violations[:5], *evaluation.dense_violations[:5]]
+    return {
+        "objective": float(evaluation.objective["value"]),
+        "violation": evaluation.violation,
+        "feasible": evaluation.feasible,
+        "metrics": evaluation.indexes,
+        "feasible_between_samples": None if evaluation.dense is None else not evaluation.dense_violations,
+        "violated": tuple(f"{row.name} by {row.violation:.3g} {row.unit}".removesuffix(" 1") for row in worst),
+    }
+
+
+@cache
+def list_versions() -> dict[str, str]:
+    """Return the versions of this package and of others, and compiler, processor and system."""
+    versions = {"nlp-gait": __version__, "python": sys.version.split()[0]}
+    for package in PACKAGES:
+        with suppress(PackageNotFoundError):
+            versions[package] = version(package)
+    try:
+        versions["compiler"] = find_compiler().summary
+    except CompilerError:
+        versions["compiler"] = "none: interpreted"
+    versions["processor"] = read_cpu_info("model name") or platform.processor() or "unknown"
+    versions["system"] = f"{platform.system()} {platform.release()} {platform.machine()}"
+    return versions
+
+
+def format_now() -> str:
+    """Return the date and time, UTC."""
+    return datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+
+
 def find_best(records: Iterable[RunRecord]) -> RunRecord | None:
     """Return the best feasible record; None without any."""
     best = min(records, key=lambda record: record.cost, default=None)
-    return best if best is not None and best.verdict.feasible else None
+    return best if best is not None and best.feasible else None
 
 
 def group_by(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
@@ -187,33 +186,28 @@ def read_record(path: Path) -> RunRecord:
 def parse_record(raw: Any) -> RunRecord:
     """Return a record from ``RunRecord.to_json``; raises ValueError for missing, wrong or contradictory fields."""
     record = decode(RunRecord, raw, unread=("schema",))
-    if math.isnan(record.verdict.violation):
-        record = replace(record, verdict=replace(record.verdict, violation=math.inf))
+    if math.isnan(record.violation):
+        record = replace(record, violation=math.inf)
     decode(StoredProblem, record.inputs.problem, "inputs.problem")
-    plain = replace_nan(record)
-    places = [(plain, raw), *((plain[name], raw.get(name, {})) for name in ("verdict", "history", "time_s"))]
-    if plain["inputs"] != raw["inputs"] or any(whole.keys() - stored.keys() - OPTIONAL for whole, stored in places):
-        raise ValueError("it must have every field, defaults too")  # a default would be another run's
+    if missing := replace_nan(record).keys() - raw.keys():
+        raise ValueError(f"{min(missing)} is missing")  # a default would be another run's
     for text in (record.inputs.objective.name, record.inputs.objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
             raise ValueError(f"{text!r} is not a name or unit of an objective")
     for title in (record.problem, record.solver):
         if not LABEL.fullmatch(title):  # names of files are made from it
             raise ValueError(f"{title!r} is not a label of a problem or solver")
-    history, verdict = record.history, record.verdict
+    history = record.history
     if not len(history.evaluations) == len(history.objective) == len(record.time_s.history):
         raise ValueError("the columns of the history differ in length")
-    counts = (record.run, record.seed, record.failed_evaluations, record.iterations, *record.evaluations.values())
+    counts = (record.run, record.seed, record.failed_evaluations, record.iterations, *record.counts.values())
     if min(counts) < 0 or any(a > b for a, b in itertools.pairwise((0, *history.evaluations))):
         raise ValueError("counts must be at least 0, and those of the history ascend")
-    unknown = record.inputs.imported and not record.evaluations and not history.evaluations
-    if not unknown and ("f" not in record.evaluations or not set(CALLS).issuperset(record.evaluations)):
-        raise ValueError(f"evaluations must be counts of {', '.join(sorted(CALLS))}, among them f")
-    if verdict.feasible and not math.isfinite(verdict.objective):
-        raise ValueError("a feasible verdict without an objective")
-    proof = verdict.guaranteed
-    if proof is not None and not (proof.satisfied or proof.violations or proof.reason):
-        raise ValueError("a guarantee is missing without a violation or a reason")
+    unknown = record.inputs.imported and not record.counts and not history.evaluations
+    if not unknown and ("f" not in record.counts or not set(CALLS).issuperset(record.counts)):
+        raise ValueError(f"counts must be of {', '.join(sorted(CALLS))}, among them f")
+    if record.feasible and not math.isfinite(record.objective):
+        raise ValueError("a feasible point without an objective")
     return record
 
 
@@ -239,25 +233,21 @@ def load_result_or_record(path: Path) -> Result:
 
 
 def load_problem(record: RunRecord) -> GaitProblem:
-    """Return the problem of a record; raises GaitError if it cannot be loaded."""
+    """Return the problem of a record; raises GaitError if it cannot be loaded, and UserCodeError for code that is not named."""
     stored = decode(StoredProblem, record.inputs.problem, "inputs.problem")
-    owner = f"the record of {record.solver}, run {record.run},"
-    name, options = resolve_stored(stored.name, stored.options, owner)
+    name, options = resolve_stored(stored.name, stored.options, f"the record of {record.solver}, run {record.run},")
     return ProblemSpec(name=name, options=options, values=stored.parameters).load()
 
 
 # Columns of tables of runs: what the judge finds, and everything.
 JUDGED: dict[str, Callable[[RunRecord], object]] = {
-    "objective": attrgetter("verdict.objective"),
-    "violation": attrgetter("verdict.violation"),
-    "feasible": attrgetter("verdict.feasible"),
-    "feasible_between_samples": attrgetter("verdict.dense_feasible"),
-    "guaranteed": lambda record: record.verdict.guaranteed and record.verdict.guaranteed.satisfied,
+    name: attrgetter(name) for name in ("objective", "violation", "feasible", "feasible_between_samples")
 }
 COLUMNS: dict[str, Callable[[RunRecord], object]] = {
-    **{name: attrgetter(name) for name in CLAIMED},
+    **{name: attrgetter(name) for name in ("problem", "solver", "run", "seed", "status")},
+    **{name: attrgetter(name) for name in ("reported_feasible", "reported_objective")},
     **JUDGED,
-    **{f"calls_{kind}": lambda record, kind=kind: record.evaluations.get(kind) for kind in CALLS},  # type: ignore[misc]
+    **{f"calls_{kind}": lambda record, kind=kind: record.counts.get(kind) for kind in CALLS},  # type: ignore[misc]
     "failed_evaluations": lambda record: None if record.inputs.imported else record.failed_evaluations,
     "iterations": lambda record: None if record.inputs.imported else record.iterations,
     "time_s": attrgetter("time_s.solve"),

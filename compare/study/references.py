@@ -8,12 +8,10 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from nlp_gait.backends.identity import PROBES, describe_difference, identify_problem
+from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem, make_key
 from nlp_gait.decoding import decode
-from nlp_gait.formulation import Objective, load
-from nlp_gait.formulation.result import StoredProblem
+from nlp_gait.formulation import Objective
 from nlp_gait.gaitbench.facts import SIX_DIGITS
-from nlp_gait.providers import PROBLEMS
 
 # Relative difference of an objective that is computed on another machine or by other compiled code.
 SAME_VALUE = 1e-9
@@ -57,40 +55,25 @@ class Shipped:
 
 
 @cache
-def load_shipped() -> tuple[Shipped, ...]:
-    """Return the shipped values; equal problems of different names have equal values."""
+def load_shipped() -> Mapping[str, Shipped]:
+    """Return the shipped values by the hash of their problem's key."""
     raw = json.loads(files("compare.study").joinpath("best_known.json").read_text(encoding="utf-8"))
-    return tuple(decode(Shipped, item) for item in raw)
+    entries = [decode(Shipped, item) for item in raw]
+    return {hash_json(make_key(entry.problem)): entry for entry in entries}
 
 
 def find_reference(problem: Mapping[str, Any]) -> Reference:
-    """Return the reference of a problem as ``identify_problem`` describes it; without a shipped value, one that says so.
-
-    The shipped problem may have another name; it must evaluate to the same values. A description without probes is completed.
-    """
-    if PROBES not in problem and problem.get("name") in PROBLEMS:
-        problem = _identify(json.dumps(problem, sort_keys=True))
-    differences = [(entry, describe_difference(entry.problem, problem)) for entry in load_shipped()]
-    shipped = next((entry for entry, difference in differences if not difference), None)
+    """Return the reference of a problem as ``identify_problem`` describes it; without a shipped value, one that says so."""
+    shipped = load_shipped().get(hash_json(make_key(problem)))
     if shipped is None:
         if generated := _find_generated(str(problem.get("options", {}).get("instance", "")), problem):
             return generated
-        names = ("name", "options", "parameters")
-        same = [why for entry, why in differences if all(entry.problem[n] == problem.get(n) for n in names)]
-        listed = any(entry.problem["name"] == problem.get("name") for entry in load_shipped())
-        if same:
-            return Reference(source=f"{OWN}; the shipped value is not used, for the problem has changed: {same[0]}")
+        listed = any(entry.problem["name"] == problem["name"] for entry in load_shipped().values())
         return Reference(source=f"{OWN}; none is shipped for {'these settings' if listed else 'this problem'}")
     objective, bound = shipped.objective, shipped.bound
     evidence = f"best of {shipped.found_by}" if bound is None else f"proven to {describe_gap(bound, objective)}"
     source = f"shipped, {evidence}"
     return Reference(objective=objective, x=shipped.x, bound=bound, source=source, proven_as=shipped.proven_as)
-
-
-@cache
-def _identify(description: str) -> Mapping[str, Any]:
-    stored = decode(StoredProblem, json.loads(description))
-    return identify_problem(load(stored.name, **stored.options).with_values(**stored.parameters))
 
 
 def _find_generated(id: str, problem: Mapping[str, Any]) -> Reference | None:

@@ -1,22 +1,15 @@
-"""A study as plain settings (command line, TOML file), and its manifest ``study.json``: settings, commands, machine, versions."""
+"""A study as plain settings, from the command line or a TOML file."""
 
-import os
-import sys
 import tomllib
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from compare.study.origin import describe_processor, describe_system, format_now, hash_installed_code
-from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop, Task, list_solvers
-from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes
+from compare.study.run import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Run, Stop, list_solvers
 from nlp_gait.decoding import decode
-from nlp_gait.errors import CompilerError, InputError
-from nlp_gait.files import check_plain, convert_errors, lock_folder, read_json, read_text, write_json
+from nlp_gait.errors import InputError
+from nlp_gait.files import check_plain, convert_errors, read_text
 from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import resolve_code
@@ -58,12 +51,12 @@ class StudySettings:
         if self.seed < 0:
             raise InputError(f"seed must be a whole number of at least 0, got {self.seed}")
 
-    def tasks(self) -> tuple[Task, ...]:
+    def make_runs(self) -> tuple[Run, ...]:
         """Return every run of the study: for each problem and solver its runs, then those that IPOPT polishes."""
-        tasks: list[Task] = []
+        runs: list[Run] = []
         for problem in self.problems:
             for solver in self.solvers:
-                task = Task(
+                first = Run(
                     problem=problem,
                     solver=solver.name,
                     settings=solver.settings,
@@ -72,12 +65,12 @@ class StudySettings:
                     seed=self.seed,
                     label=solver.label,
                 )
-                runs = range(solver.runs or (self.starts if solver.name in GRADIENT_SOLVERS else self.runs))
-                tasks += [replace(task, run=run) for run in runs]
+                numbers = range(solver.runs or (self.starts if solver.name in GRADIENT_SOLVERS else self.runs))
+                runs += [replace(first, number=number) for number in numbers]
                 if solver.polish:
-                    polished = replace(task, label=f"{task.title}+{IPOPT}", polish=True)
-                    tasks += [replace(polished, run=run) for run in runs]
-        return tuple(tasks)
+                    polished = replace(first, label=f"{first.title}+{IPOPT}", polish=True)
+                    runs += [replace(polished, number=number) for number in numbers]
+        return tuple(runs)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data as ``parse_settings`` reads it."""
@@ -183,110 +176,3 @@ class _Study(Stop):
     seed: int = 0
     handling: str | Mapping[str, Any] = "deb"
     schema: int = SCHEMA
-
-
-FILE = "study.json"
-REMEDY = "delete it; the records stay valid"
-PACKAGES = ("nlp-gait", "casadi", "numpy", "scipy", "joblib", "cma", "pymoo", "distributed")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Session:
-    """One command that ran a part of a study."""
-
-    command: str
-    started: str  #: date and time, UTC
-    machine: Mapping[str, str]  #: processor, system, number of usable processors
-    versions: Mapping[str, str]  #: of Python and the installed packages, and the hash of the code that runs solvers
-    kernel: str  #: compiler and flags of the objective, or why it is interpreted
-    jobs: str  #: worker processes, or the address of the scheduler
-
-    @classmethod
-    def begin(cls, command: str, jobs: str) -> "Session":
-        """Return a session that begins now, in this process."""
-        return cls(
-            command=command,
-            started=format_now(),
-            machine={
-                "processor": describe_processor(),
-                "system": describe_system(),
-                "processors": str(available_cores()),
-            },
-            versions={"python": sys.version.split()[0], **_list_versions(), "code": hash_installed_code()[:8]},
-            kernel=_describe_kernel(),
-            jobs=jobs,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Manifest:
-    """Content of ``study.json``."""
-
-    settings: StudySettings | None  #: of the study that a command ran last; None without one
-    sessions: tuple[Session, ...]
-    runs: tuple[str, ...] = ()  #: that belong to the study: names of their records without suffix
-
-
-@dataclass(frozen=True, kw_only=True)
-class _File:
-    schema: Literal[2] = 2
-    study: Mapping[str, Any] | None = None
-    sessions: tuple[Session, ...] = ()
-    runs: tuple[str, ...] = ()
-
-
-def write_manifest(folder: Path, settings: StudySettings, session: Session) -> None:
-    """Add a session to the manifest of a folder, with the latest settings; raises InputError if the manifest is damaged."""
-    with lock_folder(folder):
-        file = _read_file(folder)
-        file = replace(file, study=settings.to_json(), sessions=(*file.sessions, session))
-        write_json(folder / FILE, asdict(file))
-
-
-def list_runs(folder: Path, names: Sequence[str]) -> None:
-    """Make runs part of the study; they replace the runs of their problems and solvers, whose records stay as files.
-
-    Raises InputError if the manifest is damaged, and OutputError.
-    """
-    with lock_folder(folder):
-        file = _read_file(folder)
-        solvers = {_name_solver(name) for name in names}
-        kept_names = [name for name in file.runs if _name_solver(name) not in solvers]
-        if set(file.runs) != {*kept_names, *names}:
-            write_json(folder / FILE, asdict(replace(file, runs=(*kept_names, *dict.fromkeys(names)))))
-
-
-def _name_solver(name: str) -> str:
-    return name.rsplit("-", 2)[0]  # without run and key
-
-
-def _read_file(folder: Path) -> _File:
-    path = folder / FILE
-    if not os.path.lexists(path):
-        return _File()
-    raw = read_json(path, "manifest", remedy=REMEDY)
-    with convert_errors(f"manifest {str(path)!r} is damaged", InputError, REMEDY):
-        return decode(_File, raw)
-
-
-def read_manifest(folder: Path) -> Manifest:
-    """Return the manifest of a folder, empty where none is stored; raises InputError if it is damaged or of another schema."""
-    file, source = _read_file(folder), f"manifest {str(folder / FILE)!r}"
-    settings = None if file.study is None else parse_settings(file.study, source, runs_code=False)
-    return Manifest(settings=settings, sessions=file.sessions, runs=file.runs)
-
-
-def _list_versions() -> dict[str, str]:
-    versions = {}
-    for package in PACKAGES:
-        with suppress(PackageNotFoundError):
-            versions[package] = version(package)
-    return versions
-
-
-def _describe_kernel() -> str:
-    lanes = native_lanes()
-    try:
-        return " ".join([find_compiler().summary, *BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}"])
-    except CompilerError as error:
-        return f"interpreted: {error}"

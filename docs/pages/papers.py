@@ -40,11 +40,8 @@ def list_page() -> str:
 def paper_page(name: str) -> str:
     """Return the tables of a paper."""
     record = read_record(name)
-    session = record["session"]
-    words = (
-        f"Computed by `{session['command']}`, version {session['versions']['nlp-gait']}, on {session['started'][:10]}, "
-        f"{session['machine']['processor']}."
-    )
+    made = record["made"]
+    words = f"Computed by `{made['command']}`, version {made['nlp-gait']}, on {made['date'][:10]}, {made['processor']}."
     return page(literal(count_verdicts(record["verdicts"])), *_format_parts(name, record["parts"]), literal(words))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from metaheuristics.interface import Array, PopulationSearch, Rule, Start
 from metaheuristics.preparation import UnitCube
-from metaheuristics.settings import check_count, check_number, tunable
+from metaheuristics.settings import check_count, check_number
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -24,9 +24,9 @@ class CmaEs:
     """
 
     #: Points in a generation; 10 is pycma's own choice for 8 and 9 variables
-    population: int = tunable(10, 6, 60, "log")
-    sigma: float = tunable(0.3, 0.05, 0.6, "log")  #: First standard deviation, as a share of each variable's range
-    growth: float = tunable(2.0, 1.0, 3.0)  #: Factor on the population at every restart
+    population: int = 10
+    sigma: float = 0.3  #: First standard deviation, as a share of each variable's range
+    growth: float = 2.0  #: Factor on the population at every restart
     name: ClassVar[str] = "cma"
 
     def __post_init__(self) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Array, PopulationSearch, Rule, Start
 from metaheuristics.preparation import fill_fixed
-from metaheuristics.settings import bad_setting, check_count, check_installed, tunable
+from metaheuristics.settings import bad_setting, check_count, check_installed
 
 MODULES: Mapping[str, str] = {
     "DE": "soo.nonconvex.de",
@@ -39,7 +39,7 @@ class PymooSettings:
     """
 
     algorithm: str  #: Class name in pymoo, for example "GA"
-    population: int = tunable(50, 20, 200, "log")  #: Size of the population (pop_size)
+    population: int = 50  #: Size of the population (pop_size)
     settings: Mapping[str, Any] = field(default_factory=dict)  #: Further arguments of the class
     modules: ClassVar[Mapping[str, str]]  #: Where pymoo has the classes that are allowed
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from metaheuristics.algorithms.points import Points
 from metaheuristics.interface import Array, PopulationSearch, Rule, Start
-from metaheuristics.settings import check_count, check_number, tunable
+from metaheuristics.settings import check_count, check_number
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -24,14 +24,14 @@ class AntColony:
         Socha, Dorigo (2008), Ant colony optimization for continuous domains, section 3.
     """
 
-    population: int = tunable(30, 10, 100, "log")  #: Number of ants, and of starting points
-    archive: int = tunable(50, 10, 200, "log")  #: Number of points kept (k)
+    population: int = 30  #: Number of ants, and of starting points
+    archive: int = 50  #: Number of points kept (k)
     #: Reach of the preference for the best, as a share of the archive (q); small is greedy
-    locality: float = tunable(0.1, 0.01, 0.5, "log")
+    locality: float = 0.1
     #: Deviation in mean distances (xi). It acts as evaporation does in a discrete colony (Socha, Dorigo): the higher, the less
     #: the search is bound to where it has been, and the slower it converges. An evaporation rate of 0.7, as in Bhardwaj et al.,
     #: Table IV, is thus naturally `spread=0.7`
-    spread: float = tunable(0.85, 0.3, 1.2)
+    spread: float = 0.85
     name: ClassVar[str] = "aco"
 
     def __post_init__(self) -> None:
@@ -101,12 +101,12 @@ class AntColonyGrid:
     """
 
     #: Number of ants, and of starting points (which lie anywhere and deposit on the nearest level)
-    population: int = tunable(30, 10, 100, "log")
-    levels: int = tunable(101, 21, 501, "log")  #: Number of levels of each variable, bounds included
+    population: int = 30
+    levels: int = 101  #: Number of levels of each variable, bounds included
     #: Share of pheromone lost in a generation. 0.7 is the value of Bhardwaj et al., Table IV
-    evaporation: float = tunable(0.7, 0.1, 0.95)
-    depositors: int = tunable(6, 1, 10)  #: Points that deposit: the best so far and the best ants of the generation
-    exploration: float = tunable(0.1, 0.0, 0.3)  #: Share of choices made regardless of pheromone
+    evaporation: float = 0.7
+    depositors: int = 6  #: Points that deposit: the best so far and the best ants of the generation
+    exploration: float = 0.1  #: Share of choices made regardless of pheromone
     name: ClassVar[str] = "aco-grid"
 
     def __post_init__(self) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from metaheuristics.algorithms.points import Points
 from metaheuristics.interface import Array, PopulationSearch, Rule, Start
-from metaheuristics.settings import bad_setting, check_count, check_number, tunable
+from metaheuristics.settings import bad_setting, check_count, check_number
 
 # Mutants (P, n) of the members x (P, n), the best member (n,), others drawn for each member r (5, P, n), and the weight F.
 MUTATIONS: Mapping[str, Callable[[Array, Array, Array, float], Array]] = {
@@ -37,13 +37,13 @@ class DifferentialEvolution:
     """
 
     #: Members. SciPy's default is 15 for each variable; 50 is what the other algorithms here have
-    population: int = tunable(50, 10, 200, "log")
+    population: int = 50
     #: Mutation and crossover, binomial or exponential, as SciPy names them
-    strategy: str = tunable("best1bin", *STRATEGIES)
+    strategy: str = "best1bin"
     #: Least weight of a difference; the weight is drawn again for each generation
-    mutation_low: float = tunable(0.5, 0.1, 0.7)
-    mutation_high: float = tunable(1.0, 0.7, 1.2)  #: Greatest weight of a difference
-    recombination: float = tunable(0.7, 0.1, 1.0)  #: Probability of taking a variable from the mutant
+    mutation_low: float = 0.5
+    mutation_high: float = 1.0  #: Greatest weight of a difference
+    recombination: float = 0.7  #: Probability of taking a variable from the mutant
     name: ClassVar[str] = "de"
 
     def __post_init__(self) -> None:
@@ -136,10 +136,10 @@ class LShade:
     """
 
     #: members in the beginning; the source takes 18 for each variable, which is 162 for 9
-    population: int = tunable(162, 20, 400, "log")
-    archive: float = tunable(2.6, 0.0, 4.0)  #: replaced members that stay known, as a multiple of the population
-    best: float = tunable(0.11, 0.05, 0.3)  #: share of the population towards whose members the others move (p)
-    memory: int = tunable(6, 2, 20)  #: entries of what has succeeded (H)
+    population: int = 162
+    archive: float = 2.6  #: replaced members that stay known, as a multiple of the population
+    best: float = 0.11  #: share of the population towards whose members the others move (p)
+    memory: int = 6  #: entries of what has succeeded (H)
     name: ClassVar[str] = "lshade"
 
     def __post_init__(self) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from metaheuristics.algorithms.points import Points
 from metaheuristics.interface import Array, PopulationSearch, Rule, Start
-from metaheuristics.settings import bad_setting, check_count, check_number, tunable
+from metaheuristics.settings import bad_setting, check_count, check_number
 
 _CLOSE = 1e-14  # parents nearer than this share of the range count as equal, as in Deb's code
 
@@ -151,14 +151,14 @@ class GeneticAlgorithm:
         as in Gupta, Pratihar, Deb (2023), section 5; the paper is silent on survival and probabilities.
     """
 
-    population: int = tunable(50, 20, 200, "log")  #: Number of parents, and of children in a generation
-    tournament: int = tunable(2, 2, 10)  #: Parents that compete for each place among those that mate
+    population: int = 50  #: Number of parents, and of children in a generation
+    tournament: int = 2  #: Parents that compete for each place among those that mate
     crossover: Crossover = field(default=SimulatedBinary())  #: Operator on pairs
     mutation: Mutation = field(default=Polynomial())  #: Operator on children
     #: "plus" keeps the best of parents and children, without copies (as pymoo's GA does); "generational" replaces the parents
     #: by the children, except for the elites
-    survival: Literal["plus", "generational"] = tunable("plus", "plus", "generational")
-    elites: int = tunable(1, 0, 5)  #: Best parents that replace the worst children in "generational" survival
+    survival: Literal["plus", "generational"] = "plus"
+    elites: int = 1  #: Best parents that replace the worst children in "generational" survival
     name: ClassVar[str] = "ga"
 
     def __post_init__(self) -> None:

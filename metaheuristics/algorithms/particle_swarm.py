@@ -7,7 +7,7 @@ import numpy as np
 
 from metaheuristics.algorithms.points import Points
 from metaheuristics.interface import Array, PopulationSearch, Rule, Start
-from metaheuristics.settings import check_count, check_number, tunable
+from metaheuristics.settings import check_count, check_number
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -26,15 +26,15 @@ class ParticleSwarm:
         Gupta, Pratihar, Deb (2023), section 5.
     """
 
-    population: int = tunable(50, 10, 200, "log")  #: Number of particles
-    inertia: float = tunable(1.0, 0.4, 1.0)  #: Share of the velocity kept in the first iteration (w)
+    population: int = 50  #: Number of particles
+    inertia: float = 1.0  #: Share of the velocity kept in the first iteration (w)
     #: Factor on the inertia after every iteration (wdamp): 0.99 in the code that the paper cites, 1 for the constant inertia
     #: that it prints
-    inertia_damping: float = tunable(0.99, 0.95, 1.0)
-    cognitive: float = tunable(1.5, 0.5, 2.5)  #: Pull towards a particle's own best (c1)
-    social: float = tunable(2.0, 0.5, 2.5)  #: Pull towards the swarm's best (c2)
+    inertia_damping: float = 0.99
+    cognitive: float = 1.5  #: Pull towards a particle's own best (c1)
+    social: float = 2.0  #: Pull towards the swarm's best (c2)
     #: Largest speed in a variable, as a share of its range, per iteration
-    velocity_limit: float = tunable(0.1, 0.02, 0.5, "log")
+    velocity_limit: float = 0.1
     name: ClassVar[str] = "pso"
 
     def __post_init__(self) -> None:

@@ -55,7 +55,7 @@ def parse_limits(value: str | AddedLimits) -> AddedLimits:
     """
     if isinstance(value, AddedLimits):
         return value
-    names = _split_names(value)
+    names = split_names(value)
     limits = [(phase, _load_limit(name)) for phase, name in names]
     return AddedLimits(
         single_support=tuple(limit for phase, limit in limits if phase != DOUBLE),
@@ -68,18 +68,18 @@ def resolve_limits(text: str, owner: str) -> str:
     """Return names of limits in a data file (the owner) as the user gave them; raises as ``resolve_code``."""
     import nlp_gait.user_code as user_code
 
-    return ",".join(phase + user_code.resolve_code(name, "limit", owner) for phase, name in _split_names(text))
+    return ",".join(phase + user_code.resolve_code(name, "limit", owner) for phase, name in split_names(text))
 
 
 def hash_limits(text: str) -> str:
     """Return the hashes of user code among names of limits, or an empty text."""
     import nlp_gait.user_code as user_code
 
-    references = [name for _, name in _split_names(text) if user_code.is_reference(name)]
-    return ",".join(user_code.hash_source(name, "limit") for name in references)
+    references = [name for _, name in split_names(text) if user_code.is_reference(name)]
+    return ",".join(user_code.read_source_files(name, "limit").digest for name in references)
 
 
-def _split_names(text: str) -> list[tuple[str, str]]:
+def split_names(text: str) -> list[tuple[str, str]]:
     """Return the prefix that restricts a limit to some phases, or an empty text, and its name."""
     names = []
     for name in filter(None, map(str.strip, text.split(","))):
@@ -95,7 +95,7 @@ def _load_limit(name: str) -> Any:
 
     if not user_code.is_user_code(name, "limit"):
         raise unknown("limit", name, [*LIMITS, *user_code.find_entry_points("limit")])
-    user_code.allow_code(name, "limit")
+    user_code.allow_code(name)
     loaded: Any = user_code.load_object(name, "limit")
     path = user_code.parse_reference(name, "limit").home
     limit = user_code.call_user_code(name, path, loaded) if isinstance(loaded, type) else loaded

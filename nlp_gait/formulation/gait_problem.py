@@ -91,6 +91,8 @@ class GaitProblem:
     hints: SolverHints = SolverHints()  #: for solvers
     mathematics: int = 1  #: version of the formulas, raised by hand where they change on purpose
     loaded_as: str = ""  #: argument of ``load``, if that is not the name but user code
+    #: SHA-256 of the user's files that it was made of: "code" for all of a user's file, otherwise by the option that names one
+    files: Mapping[str, str] = field(default_factory=dict)
     # No arguments: only copies made by ``with_values`` and ``with_origin`` share them.
     _cache: Cache = field(default_factory=Cache, init=False, repr=False)
     _origin: Origin | None = field(default=None, init=False, repr=False)
@@ -110,6 +112,12 @@ class GaitProblem:
     def address(self) -> str:
         """Argument of ``load``, written into files of results."""
         return self.loaded_as or self.name
+
+    @property
+    def has_origin(self) -> bool:
+        """Whether ``load`` makes the same problem from its address and options."""
+        plain = (str, int, float, bool)
+        return self._origin is not None and all(isinstance(value, plain) for value in self._origin[1].values())
 
     @property
     def names(self) -> tuple[str, ...]:

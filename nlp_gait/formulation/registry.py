@@ -47,14 +47,17 @@ def maker(make: Maker) -> Maker:
         check_options(make_problem, options)
         call = {name: option.default for name, option in parameters.items()} | options
         given = {name: kind(**{f.name: call[f.name] for f in fields(kind)}) for name, kind in groups.items()}
+        files = hash_files(call)
         problem = make(**(given or call))
+        if hash_files(call) != files:
+            raise InputError(f"a file of {make.__name__.replace('_', '-')} changed while it was read; load it again")
         if not isinstance(problem, GaitProblem):
             raise InputError(f"{make.__name__!r} must make a GaitProblem, it made {type(problem).__name__}")
         grid = problem.grid
         recorded = {name: str(value) if isinstance(value, AddedLimits) else value for name, value in call.items()}
         if grid is not None and "samples_per_interval" in call:
             recorded["samples_per_interval"] = grid.samples_per_interval  # 0 leaves the choice to the problem
-        problem = replace(problem, options=recorded)
+        problem = replace(problem, options=recorded, files=files)
         refined_by = "" if grid is None else grid.refined_by or ""
         if refined_by in call:  # otherwise the maker sets ``refine`` itself
             count = getattr(grid, refined_by)
@@ -96,8 +99,9 @@ def find_maker(name: str) -> Maker:
 def _load_user_maker(name: str) -> Maker:
     import nlp_gait.user_code as user_code
 
-    user_code.allow_code(name, "problem")
-    loaded: Any = user_code.load_object(name, "problem")
+    user_code.allow_code(name)
+    files = user_code.read_source_files(name, "problem")
+    loaded: Any = user_code.load_object(name, "problem", files)
     path = user_code.parse_reference(name, "problem").home
     make: Maker
     if isinstance(loaded, GaitProblem):
@@ -113,7 +117,7 @@ def _load_user_maker(name: str) -> Maker:
     else:
         raise InputError(f"{name!r} must be a GaitProblem or a function that makes one, got {type(loaded).__name__}")
 
-    origin = UserMaker(name, user_code.hash_source(name, "problem"))
+    origin = UserMaker(name, files.digest)
 
     @lock_casadi
     @functools.wraps(make)
@@ -121,7 +125,8 @@ def _load_user_maker(name: str) -> Maker:
         check_options(make, options)
         problem = user_code.call_user_code(name, path, lambda: make(**options))
         user_code.call_user_code(name, path, lambda: check_mathematics(problem))
-        return replace(problem, loaded_as=name).with_origin(origin, options)
+        hashes = {**problem.files, "code": files.digest}
+        return replace(problem, loaded_as=name, files=hashes).with_origin(origin, options)
 
     return make_checked
 
@@ -137,7 +142,7 @@ class UserMaker:
         """Return the problem; raise InputError if its source has changed."""
         import nlp_gait.user_code as user_code
 
-        if user_code.hash_source(self.name, "problem") != self.source:
+        if user_code.read_source_files(self.name, "problem").digest != self.source:
             raise InputError(f"{self.name!r} has changed since the problem was pickled; load it again")
         return load(self.name, **options)
 

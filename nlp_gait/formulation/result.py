@@ -24,16 +24,6 @@ FINE_INTERVALS = 1000  # of a grid that splines are fitted to: their error is be
 
 
 @dataclass(frozen=True, kw_only=True)
-class StoredProbe:
-    """Values of a problem at a point, see ``nlp_gait.backends.identity``; None where they are not finite."""
-
-    x: tuple[float, ...]
-    objective: float | None
-    violation: float | None
-    rows: Mapping[str, float | None]
-
-
-@dataclass(frozen=True, kw_only=True)
 class StoredProblem:
     """A problem in a certificate or another stored result."""
 
@@ -41,8 +31,7 @@ class StoredProblem:
     options: Mapping[str, str | int | float | bool]  # of its maker
     parameters: Mapping[str, float]  # that differ from the defaults
     mathematics: int = 1  # version of the formulas
-    files: Mapping[str, str] = field(default_factory=dict)  # hashes of the files that options name
-    probes: tuple[StoredProbe, ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)  # hashes of the user's files that it was made of
 
 
 @dataclass(frozen=True, kw_only=True)

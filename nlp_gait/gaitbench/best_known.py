@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from nlp_gait.backends.identity import AGREEMENT, hash_json, identify_problem, make_key
+from nlp_gait.backends.identity import hash_json, identify_problem, make_key
 from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.backends.kernel.library_cache import find_cache_folder
 from nlp_gait.backends.solve import solve
@@ -18,6 +18,9 @@ from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe, find_shipped_facts
 from nlp_gait.gaitbench.generated import STARTS, is_generated, parse_id
 
+AGREEMENT = (
+    1e-9  # of values that identify an instance, in units of a row's scale, or of their size where that is larger
+)
 SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
 # Slack of the best known point in every row, in units of its scale: no machine's rounding makes it infeasible.
 SLACK = 1e-10

@@ -5,6 +5,7 @@ Nothing but corners is read, and hostile files are refused; libraries for meshes
 
 import math
 import os
+import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
@@ -15,7 +16,7 @@ import numpy as np
 
 from nlp_gait.errors import RobotDataError, WorkerError
 from nlp_gait.files import read_bytes
-from nlp_gait.processes import has_fork, run_in_isolation
+from nlp_gait.processes import has_fork, run_alone
 from nlp_gait.robots.robot import are_plausible
 from nlp_gait.robots.tree import Array, rotate
 
@@ -215,23 +216,19 @@ def read_in_child(owner: str, read: Callable[[], bytes]) -> bytes:
     memory = f"more than {MEMORY_LIMIT_BYTES // 2**30} GiB of memory"
     fault = f"{owner} probably needs {memory} to be read; simplify the file"
 
-    def call() -> bytes:
+    def call(_: Callable[[object], None]) -> bytes:
         try:
-            return b"+" + read()
-        except RobotDataError as error:
-            return b"-" + str(error).encode(errors="backslashreplace")
+            content = read()
         except MemoryError:
-            return b"-" + fault.encode(errors="backslashreplace")
+            raise RobotDataError(fault) from None
+        if len(content) > LARGEST_RESULT:
+            raise RobotDataError(f"{owner} holds more than {LARGEST_RESULT // 2**20} MiB of data; simplify the file")
+        return content
 
+    latest = time.monotonic() + TIME_LIMIT_S
     try:
-        result = run_in_isolation(call, TIME_LIMIT_S, LARGEST_RESULT, MEMORY_LIMIT_BYTES)
+        return run_alone(call, lambda: time.monotonic() > latest, memory_bytes=MEMORY_LIMIT_BYTES)
     except TimeoutError:
         raise RobotDataError(f"{owner} was not read within {TIME_LIMIT_S:g} s; simplify the file") from None
     except WorkerError as error:
-        raise RobotDataError(
-            f"{owner} cannot be read: {error}; it may need {memory}, or hold more than {LARGEST_RESULT // 2**20} MiB of data; "
-            "simplify the file"
-        ) from error
-    if result[:1] == b"-":
-        raise RobotDataError(result[1:].decode())
-    return result[1:]
+        raise RobotDataError(f"{owner} cannot be read: {error}; it may need {memory}; simplify the file") from error

@@ -11,8 +11,8 @@ from compare.analysis.comparison import compare_problems
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
 from compare.bench import baseline
 from compare.study.record import RunRecord
-from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec
+from compare.study.study import Study, run_study
 from nlp_gait.errors import InputError
 
 ID = "walk12-w015"
@@ -23,7 +23,7 @@ def runs() -> list[RunRecord]:
     """A few runs of three solvers, the last of which finds nothing."""
     solvers = (SolverSpec(name="pso"), SolverSpec(name="ipopt"), SolverSpec(name="random"))
     study = baseline.make_bench_study([ID], *solvers, runs=3, evaluations=1000)
-    records = run_study(Study(tasks=study.tasks()))
+    records = run_study(Study(runs=study.make_runs()))
     infeasible = [
         replace(r, verdict=replace(r.verdict, objective=math.nan, violation=1.0, feasible=False))
         for r in records

@@ -4,8 +4,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 from compare.judge import evaluate
-from compare.study.record import History, RunRecord, Times, Verdict
-from compare.study.task import Handling, Inputs, ProblemSpec, Stop, Task
+from compare.study.perform import make_record
+from compare.study.record import History, RunRecord, Times, describe_evaluation
+from compare.study.run import Handling, Inputs, ProblemSpec, Run, Stop, make_inputs
+from compare.study.study import Study, run_study
 from nlp_gait.formulation import Objective
 from nlp_gait.formulation.solution import ActiveConstraint
 
@@ -31,7 +33,7 @@ def record(
     *,
     problem: str = "walk",
     feasible: bool = True,
-    claimed: bool = True,
+    reported: bool = True,
     status: str = "evaluation budget used",
     claim: float | None = None,
     seconds_per_evaluation: float = 0.01,
@@ -48,7 +50,6 @@ def record(
         problem={"name": problem, "options": {}, "parameters": {}},
         objective=objective,
         solver=solver,
-        settings={},
         seed=run,
         handling=Handling() if search else None,
     )
@@ -60,21 +61,16 @@ def record(
         inputs=inputs,
         settings={"kind": solver},
         status=status,
-        claimed=claimed,
+        reported_feasible=reported,
         x={"a": 0.0, "b": 1.0},
-        claimed_objective=value if claim is None else claim,
-        claimed_violation=0.0 if feasible else 1.0,
-        verdict=Verdict(
-            objective=math.nan if value is None else value,
-            violation=0.0 if feasible else 1.0,
-            feasible=feasible,
-            indexes={"power_W": math.nan if value is None else value},
-            dense=None,
-            dense_feasible=dense_feasible,
-            violated=violated,
-            guaranteed=None,
-        ),
-        evaluations=evaluations or {"f": history[-1][0]},
+        reported_objective=value if claim is None else claim,
+        objective=math.nan if value is None else value,
+        violation=0.0 if feasible else 1.0,
+        feasible=feasible,
+        metrics={"power_W": math.nan if value is None else value},
+        feasible_between_samples=dense_feasible,
+        violated=violated,
+        counts=evaluations or {"f": history[-1][0]},
         failed_evaluations=0,
         iterations=len(history),
         active_constraints=active,
@@ -106,25 +102,29 @@ def judged(
     solve_s: float = 0.5,
 ) -> RunRecord:
     """A run of a search that ends at a point, as the judge finds it."""
-    task = Task(problem=ProblemSpec(name=problem), solver=solver, run=run, stop=Stop(evaluations=evaluations))
-    verdict = Verdict.from_evaluation(evaluate(task.problem.load(), x))
-    best = verdict.objective if verdict.feasible else None
-    return RunRecord.from_task(
-        task,
+    planned = Run(problem=ProblemSpec(name=problem), solver=solver, number=run, stop=Stop(evaluations=evaluations))
+    found = describe_evaluation(evaluate(planned.problem.load(), x))
+    best = found["objective"] if found["feasible"] else None
+    return make_record(
+        planned,
+        make_inputs([planned])[0],
+        Times(build=0.1, compile=0.1, solve=solve_s + 0.1 * run, objective=0.3, history=(solve_s + 0.1 * run,)),
         settings={"kind": solver},
         status="evaluation budget used",
-        claimed=verdict.feasible,
+        reported_feasible=found["feasible"],
         x=dict(x),
-        claimed_objective=best,
-        claimed_violation=verdict.violation,
-        verdict=verdict,
-        evaluations={"f": evaluations},
-        failed_evaluations=0,
+        reported_objective=best,
+        **found,
+        counts={"f": evaluations},
         iterations=1,
-        active_constraints=(),
         history=History(evaluations=(evaluations,), objective=(best,)),
-        time_s=Times(build=0.1, compile=0.1, solve=solve_s + 0.1 * run, objective=0.3, history=(solve_s + 0.1 * run,)),
     )
+
+
+def run_once(run: Run) -> RunRecord:
+    """The record of one run."""
+    (made,) = run_study(Study(runs=(run,)))
+    return made
 
 
 PRICE = ActiveConstraint(
@@ -152,7 +152,7 @@ def study() -> list[RunRecord]:
             2,
             [(100, None), (500, None)],
             feasible=False,
-            claimed=False,
+            reported=False,
             claim=9.0,
             status="<script>alert(1)</script> | failed",
             violated=("reach[<i>left</i>, 3] by 0.5",),
@@ -167,7 +167,7 @@ def study() -> list[RunRecord]:
             evaluations=calls,
             search=False,
             feasible=False,
-            claimed=True,
+            reported=True,
             claim=9.5,
             seconds_per_evaluation=0.1,
             status="restoration failed",

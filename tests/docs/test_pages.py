@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from compare.cli import PANELS, load_command
-from compare.study.task import list_solvers
+from compare.study.run import list_solvers
 from docs.check import faults_of
 from docs.pages import algorithms, api, commands, playground, problems
 from docs.pages.gallery import ORDER

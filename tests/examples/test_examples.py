@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.study.run_study import Study, check_study
 from compare.study.settings import read_settings
+from compare.study.study import Study
 
 ROOT = Path(__file__).parents[2]
 MOST_LINES = 60  # of code
@@ -106,6 +106,6 @@ def test_the_three_kinds_of_user_code(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_the_study_file_can_run() -> None:
     settings = read_settings(ROOT / "examples" / "study.toml")
-    study = Study(tasks=settings.tasks())
-    check_study(study)
-    assert len(study.tasks) == 2 * (31 + 31 + 2 * 31 + 31 + 11)
+    study = Study(runs=settings.make_runs())
+    study.check()
+    assert len(study.runs) == 2 * (31 + 31 + 2 * 31 + 31 + 11)

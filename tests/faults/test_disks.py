@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from compare.study.record import read_record
-from compare.study.record_files import locate_record
-from compare.study.run_study import Study, run_study
-from compare.study.task import ProblemSpec, Stop, Task
+from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.study import RECORDS, Study, name_record, run_study
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.export.formats import write_npz
 from nlp_gait.formulation import Signals
@@ -79,8 +78,8 @@ def write_arrays(folder: Path, finished: Finished) -> None:
 
 
 def run_a_study(folder: Path, finished: Finished) -> None:
-    tasks = tuple(Task(problem=WALK, solver="random", run=run, stop=Stop(evaluations=100)) for run in range(2))
-    run_study(Study(tasks=tasks, folder=folder), lambda task, _: finished(locate_record(folder, task)))
+    runs = tuple(Run(problem=WALK, solver="random", number=k, stop=Stop(evaluations=100)) for k in range(2))
+    run_study(Study(runs=runs, folder=folder), lambda run: finished(folder / RECORDS / f"{name_record(run)}.json"))
     finished(folder / "study.json")
 
 

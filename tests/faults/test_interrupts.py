@@ -22,11 +22,8 @@ from compare.papers import load_reproduction
 from compare.papers.paper_runs import Effort, Runner
 from compare.questions import sweep
 from compare.study.record import read_record
-from compare.study.store import Computation
 from nlp_gait.backends.solvers.solver import IterationWatch
-from nlp_gait.interrupts import (
-    Interrupted,
-)
+from nlp_gait.interrupts import Interrupted
 from tests.faults.processes import ROOT, start, wait_for
 
 SWEEP = "sweep walk12 --over step_length_m=0.05:0.12:30 --starts 1"
@@ -90,7 +87,7 @@ NOTHING = r"; (\d) finished results are stored in .*"
     ("owner", "name", "calls", "line", "said", "table"),
     [
         (IterationWatch, "eval", 60, SWEEP, rf"after (\d+) of 30 points, not all.*{KEPT}", "step_length_m-ipopt"),
-        (questions, "add_session", 1, LIFTS, "at the end" + KEPT, "foot_lift_m-ipopt"),
+        (questions, "add_origin", 1, LIFTS, "at the end" + KEPT, "foot_lift_m-ipopt"),
         (sweep, "solve_both_ways", 1, LIFTS, "after 0 of 4 solves" + NOTHING, ""),
     ],
 )
@@ -125,14 +122,14 @@ def test_compare_with_worker_processes_is_continued_with_resume(tmp_path: Path) 
     assert process.returncode == 130, messages
     assert messages.count("\n") == 1 and f"`nlp-gait compare --resume --out {tmp_path}`" in messages
     assert f"interrupted after {len(records)} of 400 runs" in messages
-    assert all(read_record(path).evaluations == {"f": 2000} for path in records)
+    assert all(read_record(path).counts == {"f": 2000} for path in records)
     assert not list(tmp_path.rglob("*.tmp*")) and not (tmp_path / "report.html").exists()
 
 
 def test_reproduce_reports_its_stored_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def run_two(runner: Runner, _: Effort) -> None:
         for name, function in (("one", lambda: 1), ("two", lambda: signal.raise_signal(signal.SIGINT))):
-            runner.compute([Computation(name=name, inputs={}, function=function)], code=())
+            runner.compute([(name, ({}, function))])
 
     module = import_module("compare.papers.nao.nao")
     monkeypatch.setattr(module, "REPRODUCTION", replace(load_reproduction("nao"), compute=run_two))

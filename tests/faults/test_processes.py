@@ -14,11 +14,10 @@ from pathlib import Path
 import pytest
 
 import nlp_gait
-from compare.study.record import RunRecord
-from compare.study.record_files import find_record, read_records, write_records
-from compare.study.run_study import Study, run_study
-from compare.study.settings import Session, SolverSpec, StudySettings, read_manifest, write_manifest
-from compare.study.task import ProblemSpec, Stop, Task
+from compare.study.perform import make_failed
+from compare.study.run import ProblemSpec, Run, Stop, make_inputs
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.study import RECORDS, Study, name_record, read_records, run_study, write_command, write_records
 from metaheuristics import ParticleSwarm
 from metaheuristics.interface import Search, Start
 from nlp_gait.backends.kernel import library_cache
@@ -30,31 +29,39 @@ WALK = ProblemSpec(name="walk12")
 STUDIES, RUNS = 3, 6
 
 
-def make_task(evaluations: int, run: int, label: str = "") -> Task:
-    return Task(problem=WALK, solver="random", label=label, stop=Stop(evaluations=evaluations), run=run)
+def make_run(evaluations: int, number: int, label: str = "") -> Run:
+    return Run(problem=WALK, solver="random", label=label, stop=Stop(evaluations=evaluations), number=number)
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiesOnce(ParticleSwarm):
-    """Particle swarm, but the first process that begins it is killed."""
+class Dies(ParticleSwarm):
+    """Particle swarm that kills its process as long as a file exists."""
 
     marker: str
 
     def start(self, start: Start) -> Search:
-        if not Path(self.marker).exists():
-            Path(self.marker).touch()
+        if Path(self.marker).exists():
             os.kill(os.getpid(), signal.SIGKILL)
         return super().start(start)
 
 
 @pytest.mark.slow
-def test_a_worker_that_dies_in_the_middle_costs_no_run(tmp_path: Path) -> None:
-    solver = DiesOnce(marker=str(tmp_path / "dead"))
-    tasks = tuple(replace(make_task(300, run), solver=solver) for run in range(4))
-    dying = run_study(Study(tasks=tasks, folder=tmp_path / "study", jobs=2))
-    assert (tmp_path / "dead").exists() and len(read_records(tmp_path / "study")) == 4
-    undisturbed = run_study(Study(tasks=tuple(replace(task, solver=ParticleSwarm()) for task in tasks)))
-    assert [record.x for record in dying] == [record.x for record in undisturbed]
+def test_a_worker_that_dies_costs_its_run_alone_which_can_be_repeated(tmp_path: Path) -> None:
+    """All others have the same bits with any number of workers."""
+    marker, folder = tmp_path / "dies", tmp_path / "study"
+    marker.touch()
+    runs = [replace(make_run(300, k), solver=ParticleSwarm()) for k in range(4)]
+    alone = run_study(Study(runs=tuple(runs)))
+    runs[1] = replace(runs[1], solver=Dies(marker=str(marker)))
+    dying = run_study(Study(runs=tuple(runs), folder=folder, jobs=2))
+    died = "failed: WorkerError: its process ended without a result, by signal SIGKILL"
+    assert [record.status == died for record in dying] == [False, True, False, False]
+    marker.unlink()
+    (folder / RECORDS / f"{name_record(dying[1])}.json").unlink()
+    again = run_study(Study(runs=tuple(runs), folder=folder, jobs=3))
+    for name in ("x", "history", "counts"):
+        assert [getattr(record, name) for record in again] == [getattr(record, name) for record in alone]
+    assert [again[k] == dying[k] for k in range(4)] == [True, False, True, True]
 
 
 def list_offspring(parent: int) -> dict[int, str]:
@@ -75,9 +82,11 @@ def list_offspring(parent: int) -> dict[int, str]:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
-@pytest.mark.parametrize(("name", "started"), [("SIGKILL", "loky"), ("SIGINT", "sleep 600"), ("SIGTERM", "sleep 600")])
+@pytest.mark.parametrize(
+    ("name", "started"), [("SIGKILL", "workers"), ("SIGINT", "sleep 600"), ("SIGTERM", "sleep 600")]
+)
 def test_workers_and_compilers_end_with_what_started_them(name: str, started: str, tmp_path: Path) -> None:
-    if started == "loky":
+    if started == "workers":
         line = "compare walk12 --algorithms pso --runs 4 --evaluations 90000000 --jobs 2 --out"
         process = start(*line.split(), str(tmp_path / "results"))
     else:
@@ -86,10 +95,10 @@ def test_workers_and_compilers_end_with_what_started_them(name: str, started: st
         program = "import nlp_gait; nlp_gait.compile_objective(nlp_gait.load('walk12'))"
         call = [sys.executable, "-c", program]
         process = subprocess.Popen(call, cwd=ROOT, env={**os.environ, **compiler, **cache}, text=True)
-    count = 2 if started == "loky" else 1
+    count = 2 if started == "workers" else 1
     try:
         wait_for(lambda: sum(started in text for text in list_offspring(process.pid).values()) >= count)
-        time.sleep(1.0 if started == "loky" else 0.0)  # the runs are in progress
+        time.sleep(1.0 if started == "workers" else 0.0)  # the runs are in progress
         offspring = list_offspring(process.pid)
     finally:
         os.kill(process.pid, getattr(signal, name))
@@ -98,25 +107,24 @@ def test_workers_and_compilers_end_with_what_started_them(name: str, started: st
 
 
 def write_study(folder: Path, study: int, barrier: Barrier) -> None:
-    """Write all records of a study, in step with the others, read those of this study back in between, and add sessions."""
-    tasks = [make_task(50 + study, run, f"study {study}") for run in range(RUNS)]
-    records = [RunRecord.make_failed(task, "tried") for task in tasks]
+    """Write all records of a study, in step with the others, read those of this study back in between, and its command."""
+    runs = [make_run(50 + study, number, f"study {study}") for number in range(RUNS)]
+    records = [make_failed(run, inputs, "tried") for run, inputs in zip(runs, make_inputs(runs), strict=True)]
     settings = StudySettings(problems=(WALK,), solvers=(SolverSpec(name="random"),))
     for count in range(1, RUNS + 1):
         barrier.wait(60)
         write_records(records[:count], folder)
-        write_manifest(folder, settings, Session.begin(f"study {study}", "1"))
-        stored = find_record(folder, tasks[count - 1])
-        assert stored is not None and stored.inputs.stop["evaluations"] == 50 + study
-        assert len(read_records(folder)) >= count  # as for the report, while others write
+        write_command(folder, settings, f"study {study}")
+        assert len(read_records(folder)[0]) >= count  # as for the report, while others write
         barrier.wait(60)
-        assert len(read_records(folder)) == STUDIES * count
+        found, damaged = read_records(folder)
+        assert len(found) == STUDIES * count and not damaged
 
 
 @pytest.mark.slow
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="processes cannot be copied here")
 def test_several_studies_in_one_folder_lose_nothing(tmp_path: Path) -> None:
-    make_task(50, 0).inputs()  # built before the forks
+    make_inputs([make_run(50, 0)])  # built before the forks
     context = multiprocessing.get_context("fork")
     studies = [*range(STUDIES), 0]  # one of them twice
     barrier = context.Barrier(len(studies))
@@ -126,16 +134,37 @@ def test_several_studies_in_one_folder_lose_nothing(tmp_path: Path) -> None:
     for job in jobs:
         job.join()
     assert [job.exitcode for job in jobs] == [0] * len(jobs)
-    stored = sorted((r.inputs.stop["evaluations"], r.run) for r in read_records(tmp_path))
-    assert stored == [(50 + study, run) for study in range(STUDIES) for run in range(RUNS)]
-    assert len(read_manifest(tmp_path).sessions) == len(studies) * RUNS
+    stored = sorted((record.inputs.stop["evaluations"], record.run) for record in read_records(tmp_path)[0])
+    assert stored == [(50 + study, number) for study in range(STUDIES) for number in range(RUNS)]
+
+
+@pytest.mark.slow
+def test_four_processes_of_one_study_that_are_killed_lose_nothing_and_the_same_command_continues(
+    tmp_path: Path,
+) -> None:
+    line = f"compare walk12 --algorithms random,pso --starts 0 --evaluations 2000 --runs 20 --jobs 1 --out {tmp_path}"
+    studies = [start(*line.split()) for _ in range(4)]
+    wait_for(lambda: len(list(tmp_path.glob("records/*/*.json"))) > 4)
+    for study in studies:
+        os.killpg(study.pid, signal.SIGKILL)
+        time.sleep(0.03)
+    for study in studies:
+        study.communicate(timeout=30)
+    kept, damaged = read_records(tmp_path)
+    times = {path: path.stat().st_mtime_ns for path in tmp_path.glob("records/*/*.json")}
+    assert not damaged and 4 < len(kept) == len(times) < 40
+    calls.nlp_gait(*line.split())
+    records, damaged = read_records(tmp_path)
+    assert len(records) == 40 and not damaged and {path: path.stat().st_mtime_ns for path in times} == times
+    runs = tuple(replace(make_run(2000, record.run), solver=record.solver) for record in records)
+    assert [record.x for record in run_study(Study(runs=runs, jobs=2))] == [record.x for record in records]
 
 
 def test_durations_do_not_follow_the_clock_on_the_wall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     backwards = itertools.count(2e9, -3600.0)
     monkeypatch.setattr(time, "time", lambda: next(backwards))
-    tasks = [Task(problem=WALK, solver=name, stop=Stop(evaluations=300)) for name in ("pso", "slsqp", "ipopt")]
-    for record in run_study(Study(tasks=tuple(tasks), folder=tmp_path)):
+    runs = tuple(Run(problem=WALK, solver=name, stop=Stop(evaluations=300)) for name in ("pso", "slsqp", "ipopt"))
+    for record in run_study(Study(runs=runs, folder=tmp_path)):
         times = record.time_s
         assert min(times.build, times.compile, times.solve, *times.history) >= 0.0
         assert list(times.history) == sorted(times.history)

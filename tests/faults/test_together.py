@@ -131,7 +131,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 # Numbers are printed to the last bit.
 SOLVERS = """
 import metaheuristics, nlp_gait
-from compare.study.task import GRADIENT_SOLVERS, list_solvers
+from compare.study.run import GRADIENT_SOLVERS, list_solvers
 from nlp_gait.backends.solvers.registry import make_solver
 problem = nlp_gait.load("nao-ssp", intervals=4)
 objective = nlp_gait.compile_objective(problem, threads=1)

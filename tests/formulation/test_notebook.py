@@ -8,8 +8,8 @@ import pytest
 
 import nlp_gait
 from compare.study.record import COLUMNS, RunRecord, make_frame
-from compare.study.run_study import Study
-from compare.study.task import ProblemSpec, Task
+from compare.study.run import ProblemSpec, Run
+from compare.study.study import Study
 from nlp_gait.errors import UnknownNameError
 from nlp_gait.formulation import Columns, Signals
 from nlp_gait.formulation.display import Skeleton, Sole, make_rectangle
@@ -70,8 +70,8 @@ def test_records_and_studies_are_one_line_and_a_frame(tmp_path: Path) -> None:
     pytest.importorskip("pandas")
     frame = make_frame([run, record("colony", 0, [(500, None)], feasible=False)])
     assert tuple(frame.columns) == (*COLUMNS, "x.a", "x.b") and list(frame["feasible"]) == [True, False]
-    tasks = tuple(Task(problem=ProblemSpec(name="nao-dsp"), solver="pso", run=k) for k in range(2))
-    study = Study(tasks=tasks, folder=tmp_path)
+    tasks = tuple(Run(problem=ProblemSpec(name="nao-dsp"), solver="pso", number=k) for k in range(2))
+    study = Study(runs=tasks, folder=tmp_path)
     assert repr(study) == f"<Study of nao-dsp by pso: 2 runs, in {str(tmp_path)!r}>"
 
 

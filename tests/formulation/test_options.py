@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from compare.judge import evaluate
-from compare.study.task import ProblemSpec, Task
+from compare.study.run import ProblemSpec, Run
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Grid, load
@@ -74,8 +74,8 @@ def test_stairs_are_recorded(tmp_path: Path) -> None:
         load("humanoid-walk", robot=problem.options["robot"], **STAIRS, slope_deg=3.0)
 
 
-def make_task(name: str, options: Mapping[str, Any]) -> Task:
-    return Task(problem=ProblemSpec(name=name, options=options), solver="ipopt")
+def make_task(name: str, options: Mapping[str, Any]) -> Run:
+    return Run(problem=ProblemSpec(name=name, options=options), solver="ipopt")
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import casadi as ca
 import pytest
 from casadi import MX
 
-from compare.study.task import ProblemSpec, Task
+from compare.study.run import ProblemSpec, Run, make_inputs
 from nlp_gait import compile_objective, load, solve, user_code
 from nlp_gait.errors import GaitError, InputError, UnknownNameError, UserCodeError
 from nlp_gait.formulation import (
@@ -26,7 +26,7 @@ from nlp_gait.formulation import (
 )
 from nlp_gait.formulation.registry import check_mathematics
 from nlp_gait.formulation.result import load_result
-from nlp_gait.user_code import hash_source
+from nlp_gait.user_code import read_source_files
 from tests.backends.toys import corner, toy
 from tests.robots.custom import humanoid
 
@@ -92,8 +92,8 @@ def test_an_installed_packages_problem_has_a_name(monkeypatch: pytest.MonkeyPatc
 def test_a_study_takes_a_problem_itself() -> None:
     spec = ProblemSpec(name=toy(corner), values={"limit": 0.25})
     assert spec.load().value("limit") == 0.25 and spec.title == "toy"
-    task = Task(problem=spec, solver="pso")
-    assert task.inputs().key != Task(problem=ProblemSpec(name=toy(corner)), solver="pso").inputs().key
+    changed, usual = make_inputs([Run(problem=s, solver="pso") for s in (spec, ProblemSpec(name=toy(corner)))])
+    assert changed.key != usual.key
     with pytest.raises(InputError, match="is already built; options are not allowed: intervals"):
         spec.with_options(intervals=3).load()
 
@@ -251,7 +251,7 @@ def test_a_source_is_the_file_and_the_files_next_to_it_that_it_imports(tmp_path:
     def hash_with(**changes: str) -> str:
         for name, content in {**files, **changes}.items():
             (tmp_path / name).write_text(content)
-        return hash_source(f"{tmp_path / 'own.py'}:leg", "problem")
+        return read_source_files(f"{tmp_path / 'own.py'}:leg", "problem").digest
 
     before = hash_with()
     assert hash_with(**{"unused.py": "Z = 1\n"}) == before == hash_with()
@@ -264,4 +264,4 @@ def test_a_source_of_five_megabytes_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "own.py"
     path.write_bytes(b"#" * 5 * 2**20)
     with pytest.raises(UserCodeError, match="it has more than 4194304 bytes"):
-        hash_source(f"{path}:leg", "problem")
+        read_source_files(f"{path}:leg", "problem")

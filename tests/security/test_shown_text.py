@@ -14,8 +14,9 @@ from compare.cli.printing import PlainConsole, escape_controls
 from compare.drawing.figures import inline_svg, make_figure, render_svg, use_style
 from compare.report.study_report import make_study_document
 from compare.report.writing import render_markdown, render_page
-from compare.study.settings import Manifest, Session, SolverSpec, StudySettings
-from compare.study.task import ProblemSpec
+from compare.study.run import ProblemSpec
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.study import StudyFile
 from tests.compare.records import study
 
 SCRIPT = "<script>alert(1)</script>"
@@ -51,20 +52,15 @@ def hostile_report() -> tuple[Page, str]:
                 inputs=replace(record.inputs, problem=problem),
                 settings={"kind": MARKED, MARKED: 1},
                 status=MARKED,
-                verdict=replace(record.verdict, violated=(MARKED,), indexes={MARKED: 1.0}),
+                violated=(MARKED,),
+                metrics={MARKED: 1.0},
+                versions={MARKED: MARKED, "compiler": MARKED},
                 active_constraints=tuple(replace(a, name=MARKED, unit=MARKED) for a in record.active_constraints),
             )
         )
-    session = Session(
-        command=f"nlp-gait compare --out '{MARKED}'",
-        started=MARKED,
-        machine={"processor": MARKED, MARKED: "x"},
-        versions={MARKED: MARKED},
-        kernel=MARKED,
-        jobs=MARKED,
-    )
     settings = StudySettings(problems=(ProblemSpec(name="walk", label=MARKED),), solvers=(SolverSpec(name=MARKED),))
-    document = make_study_document(compare_problems(records), Manifest(settings=settings, sessions=(session,)))
+    file = StudyFile(command=f"nlp-gait compare --out '{MARKED}'", date=MARKED, study=settings.to_json())
+    document = make_study_document(compare_problems(records), file)
     page = Page()
     page.feed(render_page(document))
     return page, render_markdown(document)

@@ -10,7 +10,6 @@ import pytest
 from tests.faults.processes import ROOT
 
 LOADED = (
-    "joblib.externals.loky",
     "multiprocessing.resource_tracker",
     "resource",
     "compare.cli",

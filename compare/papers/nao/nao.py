@@ -185,7 +185,7 @@ def compare_searches(result: NaoResults, phase: str) -> Found:
 
 def list_run_excesses(result: NaoResults, phase: str) -> list[float]:
     """Return the power at the end of PSO's runs above the optimum, sorted [%]."""
-    best = result.best(make_spec(phase, result.reading)).verdict.objective
+    best = result.best(make_spec(phase, result.reading)).objective
     return sorted(100 * (power / best - 1) for power in result.final_powers(phase, "PSO"))
 
 
@@ -230,9 +230,7 @@ BOOK.bind(
         "statistic-dsp": lambda r: compute_test(90),
     }
 )
-BOOK.bind(
-    {"torque-rank": lambda r: [run.verdict.indexes["torque_change_Nm"] for run in r.list_runs("ssp", "PSO")]}, runs=True
-)
+BOOK.bind({"torque-rank": lambda r: [run.metrics["torque_change_Nm"] for run in r.list_runs("ssp", "PSO")]}, runs=True)
 
 
 def measure_choice(results: Mapping[str, NaoResults], id: str) -> dict[str, float]:

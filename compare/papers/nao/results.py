@@ -21,7 +21,7 @@ from compare.papers.paper_runs import (
     make_start_tasks,
 )
 from compare.study.record import RunRecord
-from compare.study.task import IPOPT, ProblemSpec, Task
+from compare.study.run import IPOPT, ProblemSpec, Run
 from metaheuristics.registry import make_algorithm
 from nlp_gait.formulation.signals import Signals
 
@@ -109,13 +109,13 @@ class NaoResults:
 
     def sweep(self, what: str, phase: str) -> list[tuple[float, float]]:
         """Return values of the variable of a sweep and the least power there, where there is a gait."""
-        ends = [self.best(spec).verdict for spec in list_sweep(self.reading, what, phase)]
+        ends = [self.best(spec) for spec in list_sweep(self.reading, what, phase)]
         pairs = zip(SWEEPS[what, phase][1], ends, strict=True)
         return [(value, end.objective) for value, end in pairs if end.feasible]
 
     def excess(self, phase: str) -> float | None:
         """Return the power of PSO's printed solution above the optimum [%]; None without a feasible optimum."""
-        best = self.best(make_spec(phase, self.reading)).verdict
+        best = self.best(make_spec(phase, self.reading))
         return 100 * (self.measure(phase)["power_W"] / best.objective - 1) if best.feasible else None
 
     def list_runs(self, phase: str, search: str) -> list[RunRecord]:
@@ -124,11 +124,11 @@ class NaoResults:
 
     def final_powers(self, phase: str, search: str) -> list[float]:
         """Return the power at the end of each run [W]; infinite without a feasible solution."""
-        ends = [run.verdict for run in self.list_runs(phase, search)]
+        ends = self.list_runs(phase, search)
         return [end.objective if end.feasible else math.inf for end in ends]
 
 
-def _make_start_tasks(effort: NaoEffort) -> Iterator[Task]:
+def _make_start_tasks(effort: NaoEffort) -> Iterator[Run]:
     for reading in READINGS:
         for phase in PHASES:
             yield from _start_from_print(make_spec(phase, reading), phase, effort.starts)
@@ -142,13 +142,13 @@ def _make_start_tasks(effort: NaoEffort) -> Iterator[Task]:
         yield from _start_from_print(spec, "dsp", min(effort.starts, 1))
 
 
-def _start_from_print(spec: ProblemSpec, phase: str, random: int) -> Iterator[Task]:
+def _start_from_print(spec: ProblemSpec, phase: str, random: int) -> Iterator[Run]:
     """Yield a run of IPOPT from PSO's printed solution, and others from random points."""
     problem, settings = spec.load(), {"compiled": False}  # compiling takes longer than it saves
     x = np.clip(PRINTED_X[phase, "PSO"], problem.lower, problem.upper)
-    yield Task(problem=spec, solver=IPOPT, settings=settings, start=problem.by_name(x))
+    yield Run(problem=spec, solver=IPOPT, settings=settings, start=problem.by_name(x))
     for task in make_start_tasks(spec, random, settings=settings):
-        yield replace(task, run=task.run + 1)
+        yield replace(task, number=task.number + 1)
 
 
 def compute(runner: Runner, effort: NaoEffort) -> dict[str, NaoResults]:

@@ -99,7 +99,7 @@ def tabulate_phase(results: Mapping[str, NaoResults], phase: str) -> Table:
             columns[f"{search}, printed reading, {robot.upper()}"] = evaluate_point(spec, x)
     for reading in READINGS:
         best = results[reading].best(make_spec(phase, reading))
-        columns[f"IPOPT, {reading} reading"] = {**best.x, **best.verdict.indexes}
+        columns[f"IPOPT, {reading} reading"] = {**best.x, **best.metrics}
     rows = [{"": name, **{title: c.get(name) for title, c in columns.items()}} for name in (*names, *INDEXES)]
     numbers = {"ssp": (6, 7), "dsp": (8, 9)}[phase]
     caption = f"Tables {numbers[0]} and {numbers[1]}, {PHASES[phase]}: variables, and figures of the same gait"
@@ -124,7 +124,7 @@ def tabulate_shares(result: NaoResults) -> Table:
     rows = []
     for share, arms in SHARES:
         spec = make_spec("dsp", "printed", f"-{share}-{arms}", torso_share=share, arms=arms)
-        power, best = evaluate_point(spec, PRINTED_X["dsp", "PSO"])["power_W"], result.best(spec).verdict
+        power, best = evaluate_point(spec, PRINTED_X["dsp", "PSO"])["power_W"], result.best(spec)
         excess = 100 * (power / best.objective - 1) if best.feasible else None
         words = {"share of the torso": share, "arms": arms}
         rows.append({**words, "PSO's solution [W]": power, "above the optimum [%]": excess})

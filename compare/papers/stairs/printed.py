@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from compare.papers.paper import read_rows
-from compare.study.task import ProblemSpec
+from compare.study.run import ProblemSpec
 from nlp_gait.formulation import Array, Result, Signals
 from nlp_gait.formulation.display import LEFT, RIGHT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop, N, measure_joints

@@ -23,9 +23,9 @@ from compare.papers.paper_runs import (
 )
 from compare.papers.stairs import printed
 from compare.papers.stairs.printed import FOLDER, TABLE_3, TABLE_4
+from compare.study.memo import Computation
 from compare.study.record import RunRecord
-from compare.study.store import Computation
-from compare.study.task import IPOPT, ProblemSpec, Task
+from compare.study.run import IPOPT, ProblemSpec, Run
 from metaheuristics import AntColony, minimize
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.formulation import Assembly, Point
@@ -115,7 +115,7 @@ class StairsResults:
 
     def list_tracked(self, name: str) -> list[float]:
         """Return a tuned value or an index of the tracked steps of all cases."""
-        return [{**run.x, **run.verdict.indexes}[name] for run in self.tracked]
+        return [{**run.x, **run.metrics}[name] for run in self.tracked]
 
 
 def make_plan_spec(plan: str, case: int, label: str = "", **options: Any) -> ProblemSpec:
@@ -144,26 +144,26 @@ def compute(runner: Runner, effort: StairsEffort) -> dict[str, StairsResults]:
     plans = {plan: StairsResults(plan=plan, runs=runs, computed={}) for plan in PLANS.values()}
     tasks = [*_make_track_tasks(effort, plans), *(_make_choice_tasks(effort, plans) if effort.runs else ())]
     runs |= runner.run_tasks(tasks)
-    computed = runner.compute([*_make_computations(effort, plans)], code=[printed])
+    computed = runner.compute(_make_computations(effort, plans))
     results = {reading: StairsResults(plan=plan, runs=runs, computed=computed) for reading, plan in PLANS.items()}
     if effort.runs:
         for name, row in TRACKINGS.items():
             results[name] = StairsResults(plan=row["plan"], runs=runs, computed=computed, tracking=name)
-        again = runner.compute([*_make_power_computations(effort, results)], code=[])
+        again = runner.compute(_make_power_computations(effort, results))
         results = {name: replace(result, computed={**computed, **again}) for name, result in results.items()}
     return results
 
 
-def _make_plan_tasks(effort: StairsEffort) -> Iterator[Task]:
+def _make_plan_tasks(effort: StairsEffort) -> Iterator[Run]:
     for row in read_rows(FOLDER / "starts.csv"):
         spec = make_plan_spec(row.pop("plan"), int(row.pop("case")))
         start = {name: float(value) for name, value in row.items()}
-        yield Task(problem=spec, solver=IPOPT, settings=NEAR_OPTIMUM, start=start)
+        yield Run(problem=spec, solver=IPOPT, settings=NEAR_OPTIMUM, start=start)
         for task in make_start_tasks(spec, effort.starts - 1):
-            yield replace(task, run=task.run + 1)
+            yield replace(task, number=task.number + 1)
 
 
-def _make_choice_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[Task]:
+def _make_choice_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[Run]:
     """Yield plans of case 2 under each choice, from ours, and plans with the printed hip height without our limits."""
     for name, (options, values) in CHOICES.items():
         for plan, result in plans.items():
@@ -174,14 +174,14 @@ def _make_choice_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults])
         yield from make_start_tasks(replace(spec, values={**spec.values, **NO_LIMITS}), effort.starts)
 
 
-def _start_near(spec: ProblemSpec, best: RunRecord) -> Task:
+def _start_near(spec: ProblemSpec, best: RunRecord) -> Run:
     problem = spec.load()
     ends = zip(problem.names, problem.lower, problem.upper, strict=True)
     start = {name: float(np.clip(best.x[name], lower, upper)) for name, lower, upper in ends}
-    return Task(problem=spec, solver=IPOPT, start=start)
+    return Run(problem=spec, solver=IPOPT, start=start)
 
 
-def _make_track_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[Task]:
+def _make_track_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[Run]:
     for name, row in TRACKINGS.items():
         for case in TABLE_4:
             spec = make_track_spec(case, plans[row["plan"]].best(case).x, name)
@@ -190,10 +190,10 @@ def _make_track_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults]) 
                 label = spec.label if effort.runs else f"{spec.label}-short"
                 spec = replace(spec, options={**spec.options, "duration_s": effort.track_s}, label=label)
                 settings = {"time_limit_s": 600.0} if effort.runs else NEAR_OPTIMUM  # compiling pays for a whole step
-                yield Task(problem=spec, solver=IPOPT, settings=settings, start=TRACK_START)
+                yield Run(problem=spec, solver=IPOPT, settings=settings, start=TRACK_START)
 
 
-def _make_computations(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[Computation]:
+def _make_computations(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[tuple[str, Computation]]:
     for plan, result in plans.items():
         for case in TABLE_4:
             spec, x = make_plan_spec(plan, case), dict(result.best(case).x)
@@ -204,7 +204,9 @@ def _make_computations(effort: StairsEffort, plans: Mapping[str, StairsResults])
         yield make_computation(f"network-{plan}", track, partial(printed.train_network, track), **settings)
 
 
-def _make_power_computations(effort: StairsEffort, results: Mapping[str, StairsResults]) -> Iterator[Computation]:
+def _make_power_computations(
+    effort: StairsEffort, results: Mapping[str, StairsResults]
+) -> Iterator[tuple[str, Computation]]:
     for name in TRACKINGS:
         for case, run in zip(TABLE_4, results[name].tracked, strict=True):
             spec = make_track_spec(case, results[name].best(case).x, name)

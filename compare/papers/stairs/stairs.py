@@ -32,7 +32,7 @@ from compare.papers.stairs.results import (
     make_track_spec,
 )
 from compare.report.document import Figure, Part, Table, Value
-from compare.study.task import IPOPT
+from compare.study.run import IPOPT
 from nlp_gait.formulation.display import LEFT, RIGHT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.stair import SETBACK
@@ -106,10 +106,8 @@ def compare_choice(results: Mapping[str, StairsResults], name: str) -> dict[str,
     effects: dict[str, float | str] = {}
     for reading, plan in PLANS.items():
         result, (index, unit) = results[reading], INDEXES[plan]
-        (run,), ours = result.runs[f"{plan}-{name}", IPOPT], result.best(DRAWN_CASE).verdict.indexes[index]
-        value = (
-            run.verdict.indexes[index] if run.verdict.feasible else f"no plan ({', '.join(run.verdict.violated[:1])})"
-        )
+        (run,), ours = result.runs[f"{plan}-{name}", IPOPT], result.best(DRAWN_CASE).metrics[index]
+        value = run.metrics[index] if run.feasible else f"no plan ({', '.join(run.violated[:1])})"
         label = f"case {DRAWN_CASE}, {reading}"
         effects |= {f"{label} [{unit}]": value, f"{label}, ours [{unit}]": ours}
     return effects
@@ -121,9 +119,9 @@ def compare_hip_height(results: Mapping[str, StairsResults]) -> dict[str, float 
     for case in TABLE_4:
         runs = results["least energy"].runs[f"hip-{case}", IPOPT]
         effects[f"starts that are feasible at their samples, of {len(runs)}, case {case}"] = sum(
-            run.verdict.feasible for run in runs
+            run.feasible for run in runs
         )
-        worst = [*choose_best(runs).verdict.violated, "nothing"][0]
+        worst = [*choose_best(runs).violated, "nothing"][0]
         effects[f"violated between samples, case {case}"] = worst
     return effects
 
@@ -133,9 +131,9 @@ def compare_colony(results: Mapping[str, StairsResults]) -> dict[str, float | st
     result, effects = results[LITERAL], dict[str, float | str]()
     for case, colony in zip(TABLE_4, result.tracked, strict=True):
         (run,) = result.runs[make_title(LITERAL, case), IPOPT]
-        excess = 100 * (run.verdict.objective / colony.verdict.objective - 1)
-        violated = f"no feasible point ({', '.join(run.verdict.violated[:1])})"
-        effects[f"IPOPT above the colony's best, case {case} [%]"] = excess if run.verdict.feasible else violated
+        excess = 100 * (run.objective / colony.objective - 1)
+        violated = f"no feasible point ({', '.join(run.violated[:1])})"
+        effects[f"IPOPT above the colony's best, case {case} [%]"] = excess if run.feasible else violated
     return effects
 
 

@@ -20,7 +20,7 @@ from compare.papers.paper_runs import (
     make_start_tasks,
 )
 from compare.study.record import RunRecord
-from compare.study.task import IPOPT, ProblemSpec, Task
+from compare.study.run import IPOPT, ProblemSpec, Run
 from metaheuristics import GeneticAlgorithm
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped
@@ -130,7 +130,7 @@ class Results:
     @property
     def f1max_over_time(self) -> list[float]:
         """The model's largest f1 at each T of Table IV [1/(m^2 s)]."""
-        return [F1MAX * self.best(f"stable-{row.step_time_s:g}s").verdict.objective for row in TABLE_4]
+        return [F1MAX * self.best(f"stable-{row.step_time_s:g}s").objective for row in TABLE_4]
 
     @property
     def f1(self) -> list[float]:
@@ -153,7 +153,7 @@ def compute(runner: Runner, effort: Walk12Effort) -> dict[str, Results]:
     return results
 
 
-def _make_tasks(effort: Walk12Effort) -> Iterator[Task]:
+def _make_tasks(effort: Walk12Effort) -> Iterator[Run]:
     for reading in READINGS:
         if reading != SECOND:
             for row in TABLE_3:
@@ -168,7 +168,7 @@ def _make_tasks(effort: Walk12Effort) -> Iterator[Task]:
         yield from _make_runs(effort, _make_spec(LITERAL, f"unbent-{weight:g}", weight, reach_margin_rad=0.0))
 
 
-def _make_optimum_tasks(effort: Walk12Effort, results: Mapping[str, Results]) -> Iterator[Task]:
+def _make_optimum_tasks(effort: Walk12Effort, results: Mapping[str, Results]) -> Iterator[Run]:
     for reading, result in results.items():
         for row, f1max in zip(TABLE_4, result.f1max_over_time, strict=True):
             values = {"f1max": f1max, "step_time_s": row.step_time_s}
@@ -185,7 +185,7 @@ def make_title(reading: str, what: str) -> str:
     return f"{reading.strip('()').replace(' ', '-')}-{what}"
 
 
-def _make_runs(effort: Walk12Effort, spec: ProblemSpec, *, ga: bool = False) -> Iterator[Task]:
+def _make_runs(effort: Walk12Effort, spec: ProblemSpec, *, ga: bool = False) -> Iterator[Run]:
     yield from make_start_tasks(spec, effort.starts)
     if ga:
         yield from make_search_tasks(spec, {"ga": GA}, effort.runs, GA_EVALUATIONS)

@@ -41,7 +41,7 @@ from compare.papers.walk12.results import (
 )
 from compare.report.document import Figure, Part, Prose, Table, Value
 from compare.study.record import RunRecord
-from compare.study.task import ProblemSpec
+from compare.study.run import ProblemSpec
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.gaits.walk12 import walk12_model
 from nlp_gait.gaits.walk12.walk12_model import GRAVITY, load_point_mass_biped
@@ -65,19 +65,19 @@ def list_f(result: Results, rows: Sequence[PaperRow]) -> list[float]:
 
 def compute_f1max(result: Results) -> float:
     """Return the largest f1 [1/(m^2 s)]."""
-    return F1MAX * result.best("1").verdict.objective
+    return F1MAX * result.best("1").objective
 
 
 def list_gaps(result: Results) -> list[float]:
     """Return how far f of the gaits of Table III is below the optima [%]."""
     pairs = zip(list_f(result, TABLE_3), result.optima, strict=True)
-    return [100 * (1 - f / best.verdict.objective) for f, best in pairs]
+    return [100 * (1 - f / best.objective) for f, best in pairs]
 
 
 def list_gaps_over_time(result: Results) -> list[float]:
     """Return how far f of the gaits of Table IV is below the optima [%]."""
     rows = zip(TABLE_4, result.f1max_over_time, result.optima_over_time, strict=True)
-    return [100 * (1 - compute_f(row, most, **result.options) / best.verdict.objective) for row, most, best in rows]
+    return [100 * (1 - compute_f(row, most, **result.options) / best.objective) for row, most, best in rows]
 
 
 def compute_lead_by_print(result: Results) -> float:
@@ -110,7 +110,7 @@ def compute_spread(values: Sequence[float]) -> float:
 def list_share_spreads(result: Results) -> list[float]:
     """Return the spread of f1 / f1max over T, by the print and (11), and of the optima [%]."""
     pairs = zip(result.optima_over_time, result.f1max_over_time, strict=True)
-    ours = [best.verdict.indexes["f1_per_m2s"] / most for best, most in pairs]
+    ours = [best.metrics["f1_per_m2s"] / most for best, most in pairs]
     return [compute_spread([row.implied_f1 / row.f1max for row in TABLE_4]), compute_spread(ours)]
 
 
@@ -186,7 +186,7 @@ def compute_leg_room(result: Results) -> float:
 
 def list_ends(result: Results, what: Sequence[str], scale: float) -> list[list[float]]:
     """Return f at the ends of the GA's runs on each problem, times a scale; minus infinity without a feasible gait."""
-    ends = [[run.verdict for run in result.find_runs(problem, "ga")] for problem in what]
+    ends = [result.find_runs(problem, "ga") for problem in what]
     return [[scale * end.objective if end.feasible else -math.inf for end in row] for row in ends]
 
 
@@ -224,7 +224,7 @@ def measure_bounds(results: Mapping[str, Results]) -> dict[str, float]:
     """Return the gain of f where knees may be straight [%]."""
     result, effects = results[LITERAL], dict[str, float]()
     for weight in UNBENT_WEIGHTS:
-        free, bent = (result.best(f"{prefix}{weight:g}").verdict.objective for prefix in ("unbent-", ""))
+        free, bent = (result.best(f"{prefix}{weight:g}").objective for prefix in ("unbent-", ""))
         effects[f"optimal f at λ = {weight:g} [%]"] = 100 * (free / bent - 1)
     return effects
 
@@ -254,8 +254,8 @@ BOOK.bind(
         "variables": lambda r: [1e3 * x for best in r.optima for x in get_point(best)[1:]],
         "steps-over-time": lambda r: [1e3 * get_point(best)[0] for best in r.optima_over_time],
         "most-stable": lambda r: 100 * (r.f1[-1] / max(r.f1[:-1]) - 1),
-        "short-steps": lambda r: [run.verdict.indexes["f1_per_m2s"] for run in r.front],
-        "margin": lambda r: [best.verdict.indexes["f1_per_m2s"] for best in r.optima],
+        "short-steps": lambda r: [run.metrics["f1_per_m2s"] for run in r.front],
+        "margin": lambda r: [best.metrics["f1_per_m2s"] for best in r.optima],
         "static": lambda r: [compute_stable_share(x, r.zmp) for x in (LAST.x, get_point(r.best("1")))],
         "speed": lambda r: [row.s for row in (SECOND_ROW, SMALL, LAST)],
         "time-steps": lambda r: GA.population * PRINTED_STEPS,
@@ -263,7 +263,7 @@ BOOK.bind(
         "f1max-over-time": lambda r: r.f1max_over_time,
         "share-over-time": list_share_spreads,
         "slows": list_speeds_over_time,
-        "f-over-time": lambda r: compute_spread([best.verdict.objective for best in r.optima_over_time]),
+        "f-over-time": lambda r: compute_spread([best.objective for best in r.optima_over_time]),
         "accuracy": list_zmp_errors,
         "motor-mass": lambda r: float(ca.sum1(walk12_model.list_masses(load_point_mass_biped()))) / len(JOINTS),
         "ranges": compute_unreachable_share,
@@ -311,7 +311,7 @@ def tabulate_third(results: Mapping[str, Results]) -> Table:
         what = f"{row.weight:g}"
         searched = (make_title(LITERAL, what), "ga") in ours.runs
         median = float(np.median(list_ends(ours, [what], 1.0))) if searched else None
-        solved = {"GA, median f": median, "IPOPT: f": best.verdict.objective}
+        solved = {"GA, median f": median, "IPOPT: f": best.objective}
         rows.append({"λ": row.weight, "paper: f": row.f, **gaits, **solved, **_pair(row, best)})
     return tabulate("table3", "Table III, f under the paper's f1max", rows)
 
@@ -338,7 +338,7 @@ def draw(results: Mapping[str, Results]) -> Figure:
     """Return the trade-off between Q and s."""
     figure, axes = make_axes(4.6, 3.2)
     for name, style in ((LITERAL, "-"), (RAISED, "--")):
-        front = [(1e3 * run.x["step_length_m"], 1e3 * run.verdict.indexes["Q_m2s"]) for run in results[name].front]
+        front = [(1e3 * run.x["step_length_m"], 1e3 * run.metrics["Q_m2s"]) for run in results[name].front]
         axes.plot(*zip(*front, strict=True), style, color=COLOURS["ipopt"], label=f"least Q by IPOPT, {name}")
     printed = [(1e3 * row.s, 1e3 / f1) for row, f1 in zip(TABLE_3, results[LITERAL].f1, strict=True)]
     axes.plot(*zip(*printed, strict=True), "o", color=COLOURS["ga"], label="printed gaits, as printed")

@@ -11,16 +11,16 @@ from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import make_axis_label
 from compare.drawing.figures import COLOURS, add_legend_below, make_figure, use_style
-from compare.questions.pareto import front as front_module
 from compare.questions.pareto.competing import CompetingObjective, make_competing_objective
 from compare.questions.pareto.front import FrontPoint, Knee, find_knees, solve_front
 from compare.questions.question import Answer, Question, Work, make_record_table, make_table
 from compare.report.document import Figure, Part
 from compare.study.references import find_reference
-from compare.study.task import describe_problem
+from compare.study.run import describe_problem
 from metaheuristics.multi_objective import check_budgets, make_front_algorithm, minimize_many
-from nlp_gait.backends.identity import fingerprint, identify_problem
+from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 
@@ -142,10 +142,10 @@ class Pareto(Question[FoundFront]):
         criterion, problem = self.criterion, self.criterion.drop_demand(self.problem)
         best = list(find_reference(identify_problem(self.problem)).x)
         effort: dict[str, Any] = {"points": self.points, "starts": self.starts, "seed": self.seed, "known": best}
-        inputs = {**fingerprint(problem), "criterion": criterion.name, **effort}
-        solver, progress, code = work.solver(), work.progress, [front_module]
+        inputs = {**identify_problem(problem), "criterion": criterion.name, **effort}
+        solver, progress = IpoptSettings(), work.progress
         solve = partial(solve_front, problem, criterion, **effort, solver=solver, progress=progress)
-        front = work.compute(tuple[FrontPoint, ...], f"front-{criterion.name}", inputs, solve, code)
+        front = work.compute(tuple[FrontPoint, ...], f"front-{criterion.name}", inputs, solve)
         if not self.searches:
             yield FoundFront(front, find_knees(front))
             return
@@ -159,7 +159,7 @@ class Pareto(Question[FoundFront]):
         scale = Scale(front)  # keeps either objective from dominating an algorithm's distances
         objectives = PowerAndCompeting(compile_objective(problem), self.criterion, scale)
         ranges = [*scale.best.tolist(), *scale.ranges.tolist()]
-        identity = {**fingerprint(problem), "criterion": self.criterion.name, "scale": ranges}
+        identity = {**identify_problem(problem), "criterion": self.criterion.name, "scale": ranges}
         fronts: tuple[SearchFront, ...] = ()
         for name, budgets in self.searches.items():
             settings = repr(make_front_algorithm(name))

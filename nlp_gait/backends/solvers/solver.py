@@ -1,6 +1,5 @@
 """The interface of an NLP solver: one run of a problem from one start point; and a callback that ends runs."""
 
-import json
 import math
 import threading
 import time
@@ -19,7 +18,7 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.interrupts import never
-from nlp_gait.processes import has_fork, run_in_isolation
+from nlp_gait.processes import has_fork, run_alone
 
 INTERRUPTED, TIME_IS_UP, KILLED = "Interrupted", "Maximum_WallTime_Exceeded", "Killed"
 TOO_MANY = "Maximum_Iterations_Exceeded"
@@ -32,7 +31,6 @@ REASONS = {
 # Variables from which one iteration may outlast the time limit: of the 15,754 of stairs-track's, one took 591 s.
 LARGE = 5000
 GRACE_S = 5.0  # after the time limit, to finish an iteration
-MOST_BYTES = 2**28  # of what a process returns
 
 
 class Solver(Protocol):
@@ -147,7 +145,7 @@ class IterationWatch(ca.Callback):
         """Say why the run of this thread ends."""
         self._of_thread.reason = reason
 
-    def send_iterates(self, send: Callable[[bytes], bytes]) -> None:
+    def send_iterates(self, send: Callable[[bytes], None]) -> None:
         """Send all iterates of this thread's run, see ``_pack_iterate``; ``stop`` is asked no more."""
         self._of_thread.stop, self._of_thread.send = never, send
 
@@ -222,21 +220,19 @@ class WatchedSolver:
         n, m = len(arguments["lbx"]), len(arguments["lbg"])
         iterates = [_pack_iterate({"x": arguments["x0"], "lam_x": np.zeros(n), "lam_g": np.zeros(m)})]
 
-        def call(ask: Callable[[bytes], bytes]) -> bytes:
-            watch.send_iterates(ask)
+        def call(send: Callable[[bytes], None]) -> dict[str, Any]:
+            watch.send_iterates(send)
             result, stats = solver(**arguments), solver.stats()
-            ask(_pack_iterate(result))
+            send(_pack_iterate(result))
             counts = {name: count for name, count in stats.items() if name.startswith("n_call_")}
             ending = {name: stats[name] for name in ("iter_count", "return_status", "success")}
-            return json.dumps({"reason": watch.reason, "stats": {**counts, **ending}}).encode()
+            return {"reason": watch.reason, "stats": {**counts, **ending}}
 
-        def keep(iterate: bytes) -> bytes:
+        def keep(iterate: bytes) -> None:
             iterates[:] = [iterate]
-            return b""
 
-        left = watch.deadline - time.perf_counter() + GRACE_S
         try:
-            ended = json.loads(run_in_isolation(call, left, MOST_BYTES, answer=keep, stop=watch.stop))
+            ended = run_alone(call, lambda: watch.stop() or time.perf_counter() > watch.deadline + GRACE_S, keep)
         except TimeoutError:
             reason = INTERRUPTED if watch.stop() else KILLED
             ended = {"reason": reason, "stats": {"iter_count": 0, "return_status": reason, "success": False}}

@@ -10,7 +10,7 @@ import pytest
 
 from compare.questions.certainty import run_stored_starts
 from compare.questions.question import Work
-from compare.study.store import Store
+from compare.study.memo import Memo
 from nlp_gait.backends.optima.optimum import find_optimum
 from nlp_gait.backends.solve import Continuation, find_cheapest_feasible, solve, solve_both_ways
 from nlp_gait.backends.solvers.nlpsol import Nlpsol, probe
@@ -74,7 +74,7 @@ def test_a_solver_with_a_name_and_a_run_is_enough(tmp_path: Path) -> None:
         "",
         "interpreted",
     )
-    ends = run_stored_starts(problem, Work(store=Store(tmp_path)), starts=3, solver=Corners())
+    ends = run_stored_starts(problem, Work(memo=Memo(tmp_path)), starts=3, solver=Corners())
     assert all(end.feasible for end in ends) and [end.objective for end in ends] == pytest.approx([1.5] * 3)
 
 

@@ -8,14 +8,14 @@ import pytest
 from threadpoolctl import threadpool_info
 
 import nlp_gait
-from compare.study.run_task import try_task
-from compare.study.task import ProblemSpec, Stop, Task
+from compare.study.run import ProblemSpec, Run, Stop
 from nlp_gait.backends.solvers import nlpsol
 from nlp_gait.backends.solvers import solver as solver_module
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.registry import make_solver
 from nlp_gait.backends.solvers.solver import CasadiBlas, IterationWatch, WatchedSolver
 from nlp_gait.errors import InputError
+from tests.compare.records import run_once
 
 WALK = ProblemSpec(name="walk12")
 
@@ -100,8 +100,8 @@ def test_other_solvers_heed_it(name: str, monkeypatch: pytest.MonkeyPatch) -> No
         problem, problem.start_point(np.random.default_rng(0))
     )
     assert (end.converged, end.status) == (False, "stopped at the time limit") and end.iterations <= 3
-    record = try_task(Task(problem=WALK, solver="nlpsol", settings={"plugin": name}, stop=Stop(time_limit_s=0.03)))
-    assert record.status == "stopped at the time limit" and not record.claimed and record.x
+    record = run_once(Run(problem=WALK, solver="nlpsol", settings={"plugin": name}, stop=Stop(time_limit_s=0.03)))
+    assert record.status == "stopped at the time limit" and not record.reported_feasible and record.x
 
 
 def test_a_missing_linear_solver_is_reported_and_never_replaced() -> None:

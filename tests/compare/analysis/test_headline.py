@@ -16,8 +16,8 @@ from compare.analysis.record_statistics import find_best_known
 from compare.report.study_report import write_better_points
 from compare.study.record import RunRecord, Times
 from compare.study.references import Reference, find_reference
-from compare.study.run_study import Study, run_study
-from compare.study.task import ProblemSpec, Stop, Task
+from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.study import Study, run_study
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.formulation.result import load_result
 from nlp_gait.proofs.certificate import load_certificates
@@ -30,8 +30,8 @@ CERTIFIED = load_certificates()["walk12-lambda-0.4"].problem
 def runs() -> list[RunRecord]:
     """Two short runs of a search without IPOPT."""
     spec = ProblemSpec(name="walk12", options=CERTIFIED["options"], values=CERTIFIED["parameters"])
-    tasks = [Task(problem=spec, solver="pso", stop=Stop(evaluations=300), run=run) for run in range(2)]
-    return run_study(Study(tasks=tuple(tasks)))
+    tasks = [Run(problem=spec, solver="pso", stop=Stop(evaluations=300), number=run) for run in range(2)]
+    return run_study(Study(runs=tuple(tasks)))
 
 
 def compare_with(known: Reference, runs: list[RunRecord]) -> Comparison:
@@ -43,7 +43,7 @@ def test_a_study_without_ipopt_is_measured_from_the_shipped_value(runs: list[Run
     (comparison,) = compare_problems(runs)
     assert comparison.reference == find_reference(CERTIFIED).objective != find_best_known(runs)
     assert comparison.best is not None
-    value = comparison.best.verdict.objective
+    value = comparison.best.objective
     assert comparison.gap(-value) == pytest.approx((comparison.reference - value) / comparison.reference)
     known = f"the proven optimum of {comparison.reference:.6f}"
     assert re.fullmatch(rf"The median PSO run ends [0-9.]+ % below {known}\..*", write_headline(comparison))
@@ -63,13 +63,13 @@ def test_a_better_run_is_announced_and_offered(runs: list[RunRecord], tmp_path: 
 
 
 def test_a_record_that_only_claims_to_be_better_is_not_offered(runs: list[RunRecord], tmp_path: Path) -> None:
-    forged = [replace(r, verdict=replace(r.verdict, objective=0.99)) for r in runs]
+    forged = [replace(r, objective=0.99) for r in runs]
     comparison = compare_with(Reference(objective=0.95), forged)
     assert comparison.better is not None and write_better_points(tmp_path, [comparison]) == []
 
 
 def test_less_than_the_tolerance_is_no_gain(runs: list[RunRecord]) -> None:
-    best = max(r.verdict.objective for r in runs)
+    best = max(r.objective for r in runs)
     comparison = compare_with(Reference(objective=best * (1 - 5e-7)), runs)
     assert comparison.better is None and comparison.gap(-best) == 0.0
 
@@ -197,8 +197,7 @@ def test_the_users_solver_is_named_with_those_from_which_it_differs() -> None:
     for solver, value in values.items():
         for run in range(12):
             made = record(solver, run, [(10, value + 2e-3 * run * (solver != "ipopt"))])
-            code = {"solver": {"name": "my.py:mine", "source_sha256": "0" * 64}} if solver == "mine" else {}
-            records.append(replace(made, inputs=replace(made.inputs, **code)))
+            records.append(replace(made, inputs=replace(made.inputs, code="0" * 64 if solver == "mine" else "")))
     assert write_headline(compare_problems(records)[0]) == (
         "The median mine run ends 0.31 % above the best value found (10.000000 W), near 0.32 % (order uncertain), PSO 5.1 %; "
         "IPOPT reaches it from all 12 starts. By rank-sum tests mine is better than PSO, worse than IPOPT and not "

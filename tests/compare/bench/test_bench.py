@@ -28,7 +28,7 @@ def test_everything_of_the_small_suite_is_shipped() -> None:
         records = load_baseline(id)
         assert sorted((r.solver, r.run) for r in records) == sorted(product(BASELINE, range(RUNS)))
         assert all(r.seed == r.run and r.problem == id for r in records)
-        assert {r.evaluations["f"] for r in records if r.inputs.handling} <= {*range(9_900, 10_001)}
+        assert {r.counts["f"] for r in records if r.inputs.handling} <= {*range(9_900, 10_001)}
 
 
 @pytest.mark.slow
@@ -37,7 +37,7 @@ def test_no_shipped_run_is_better_than_the_best_known() -> None:
     for id in list_baselines():
         instance, records = gaitbench.load(id), load_baseline(id)
         sign = instance.gait_problem.objective.sign
-        best = min((sign * r.verdict.objective for r in records if r.verdict.feasible), default=math.inf)
+        best = min((sign * r.objective for r in records if r.feasible), default=math.inf)
         assert best >= instance.best_known - 1e-5 * abs(instance.best_known), id
 
 
@@ -55,7 +55,7 @@ def test_places_follow_from_expected_running_times() -> None:
         replace(
             record,
             solver="faster",
-            evaluations={kind: count // 2 for kind, count in record.evaluations.items()},
+            counts={kind: count // 2 for kind, count in record.counts.items()},
             history=replace(record.history, evaluations=tuple(e // 2 for e in record.history.evaluations)),
         )
         for record in records
@@ -76,7 +76,9 @@ def test_a_solver_that_finds_nothing_is_last() -> None:
         replace(
             record,
             solver="nothing",
-            verdict=replace(record.verdict, objective=math.nan, violation=1.0, feasible=False),
+            objective=math.nan,
+            violation=1.0,
+            feasible=False,
         )
         for id in ids
         for record in load_baseline(id)

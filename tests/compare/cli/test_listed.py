@@ -4,7 +4,7 @@ import json
 from importlib.resources import files
 from typing import Any
 
-from compare.study.task import list_solvers
+from compare.study.run import list_solvers
 from metaheuristics.multi_objective import FRONT_ALGORITHMS
 from nlp_gait import formulation
 from nlp_gait.robots import list_robots

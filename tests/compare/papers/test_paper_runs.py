@@ -7,8 +7,8 @@ import pytest
 
 import nlp_gait
 from compare.papers.paper_runs import Runner, choose_best, make_start_tasks
-from compare.study.run_task import run_task
-from compare.study.task import ProblemSpec, Task, check_task
+from compare.study.perform import run_task
+from compare.study.run import ProblemSpec, Run, check_run
 from nlp_gait.errors import InputError
 from tests.compare.records import POWER, record
 
@@ -42,11 +42,11 @@ def test_a_run_without_a_point_ends_the_reproduction_and_says_why(tmp_path: Path
     with pytest.raises(
         InputError, match="walk12/no_luck-0000-[0-9a-f]{8} failed: ValueError: no luck; fix this and delete"
     ):
-        Runner(folder=tmp_path, jobs=1).run_tasks([Task(problem=WALK, solver=no_luck)])
+        Runner(folder=tmp_path, jobs=1).run_tasks([Run(problem=WALK, solver=no_luck)])
 
 
 def test_a_start_point_is_for_nlp_solvers() -> None:
     point = make_start_tasks(WALK, 1)[0].start
-    check_task(Task(problem=WALK, solver="slsqp", start=point))
+    check_run(Run(problem=WALK, solver="slsqp", start=point))
     with pytest.raises(InputError, match="'pso' takes no start point"):
-        check_task(Task(problem=WALK, solver="pso", start=point))
+        check_run(Run(problem=WALK, solver="pso", start=point))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from compare.study.store import Store
 
 import compare.questions
 from compare.questions import certainty
@@ -19,7 +20,6 @@ from compare.questions.prices import Prices
 from compare.questions.question import Answer, Question, Work, find
 from compare.questions.sweep import Sweep, parse_axis
 from compare.report.document import Table
-from compare.study.store import Store
 from nlp_gait import load
 from nlp_gait.files import replace_nan
 from tests.compare.cli.calls import as_json, nlp_gait

@@ -6,7 +6,7 @@ import pytest
 
 from compare.questions.prices import AGREEMENT, Prices
 from compare.questions.question import Work, find
-from compare.study.store import Store
+from compare.study.memo import Memo
 from nlp_gait import load, make_solver
 from nlp_gait.errors import InputError
 
@@ -20,7 +20,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_slopes_agree_with_solving_again_where_it_can_be_done(folder: Path) -> None:
-    found = find(Prices(problem=load("walk12"), starts=2), Work(store=Store(folder)))
+    found = find(Prices(problem=load("walk12"), starts=2), Work(memo=Memo(folder)))
     assert found.robot == found.weak == () and found.reason is None
     # f holds (1 - lambda) s / f2max, so that its slope is -(1 - 0.15) 0.13 / 0.13^2.
     assert found.limits[0].name == "f2max_m" and found.limits[0].slope == pytest.approx(-0.85 / 0.13, rel=1e-6)

@@ -7,11 +7,11 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
+from compare.study.store import Store, encode_outcome, parse_outcome, store_runs
 
 import nlp_gait
 from compare.questions.question import Work, find
 from compare.questions.sweep import Sweep, parse_axis
-from compare.study.store import Store, encode_outcome, parse_outcome, store_runs
 from nlp_gait.backends.solve import run_starts
 from nlp_gait.formulation.solution import Best, Outcome
 

@@ -10,7 +10,7 @@ from compare.questions.question import Work, find
 from compare.questions.sweep import Sweep, parse_axis
 from compare.questions.swept_walks import SweepPoint
 from compare.report.document import Figure
-from compare.study.store import Store
+from compare.study.memo import Memo
 from nlp_gait import load
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load_result
@@ -38,7 +38,7 @@ def question() -> Sweep:
 @pytest.fixture(scope="module")
 def points(question: Sweep, folder: Path) -> list[SweepPoint]:
     """Two gaits, and a point without one."""
-    found = find(question, Work(store=Store(folder)))
+    found = find(question, Work(memo=Memo(folder)))
     lost = replace(found[1], at={"speed_m_s": 1.0}, feasible=False, status="in the way: step_length")
     return [*found, lost]
 

@@ -11,7 +11,7 @@ import nlp_gait
 from compare.report import write_report
 from compare.report.interactive import animate_gait
 from compare.study.record import RunRecord
-from compare.study.settings import Manifest
+from compare.study.study import StudyFile
 from docs.browser import (
     SCREENS,
     Visit,
@@ -55,7 +55,7 @@ def browser() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory, browser: Any, coarse_pages: None) -> Path:
     folder = tmp_path_factory.mktemp("interactive")
-    write_report(folder, [*study(), *gaits()], Manifest(settings=None, sessions=()))
+    write_report(folder, [*study(), *gaits()], StudyFile())
     return folder / "report.html"
 
 

@@ -14,9 +14,8 @@ from compare.report.document import Document
 from compare.report.latex import format_latex_table
 from compare.report.study_report import make_study_document
 from compare.study.record import RunRecord
-from compare.study.run_study import Study, run_study
-from compare.study.settings import Manifest
-from compare.study.task import ProblemSpec, Stop, Task
+from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.study import Study, run_study
 
 EMPTY = Document(title="", parts=())
 
@@ -26,11 +25,11 @@ def records() -> list[RunRecord]:
     problem, stop = ProblemSpec(name="walk12"), Stop(evaluations=1000)
     labels = {"pso": "pso", "random": "RD_1 50"}
     tasks = [
-        Task(problem=problem, solver=solver, stop=stop, run=run, label=labels[solver])
+        Run(problem=problem, solver=solver, stop=stop, number=run, label=labels[solver])
         for solver in labels
         for run in range(6)
     ]
-    return run_study(Study(tasks=tuple(tasks)))
+    return run_study(Study(runs=tuple(tasks)))
 
 
 def test_the_numbers_are_those_of_the_runs(records: list[RunRecord]) -> None:
@@ -38,7 +37,7 @@ def test_the_numbers_are_those_of_the_runs(records: list[RunRecord]) -> None:
     rows = [line.removesuffix(r" \\").split(" & ") for line in text.splitlines() if line.startswith(("PSO", "RD"))]
     assert [row[0] for row in rows] == ["PSO", r"RD\_1 50"] and rows[0][2].startswith("0.")
     for row, solver in zip(rows, ("pso", "RD_1 50"), strict=True):
-        values = [r.verdict.objective for r in records if r.solver == solver and r.verdict.feasible]
+        values = [r.objective for r in records if r.solver == solver and r.feasible]
         assert row[1] == f"{len(values)}/6"
         assert row[2] == f"{max(values):.4f}" and row[6] == f"{min(values):.4f}"  # maximised
         assert (row[4], row[5]) == (f"{mean(values):.4f}", f"{stdev(values):.4f}")
@@ -76,7 +75,7 @@ def test_runs_csv_is_written_again_where_it_exists(records: list[RunRecord], tmp
 @pytest.mark.slow
 def test_all_figures_are_written_for_papers_with_embedded_fonts(records: list[RunRecord], tmp_path: Path) -> None:
     comparisons = compare_problems(records)
-    document = make_study_document(comparisons, Manifest(settings=None, sessions=()))
+    document = make_study_document(comparisons, StudyFile())
     *figures, captions = FurtherFiles(figures=True).write(tmp_path, comparisons, document)
     names = {"walk12-final", "walk12-gaits", "walk12-convergence", "walk12-runtime", "walk12-curves"}
     assert {figure.name for figure in figures} == {f"{name}.{kind}" for name in names for kind in ("png", "pdf")}
@@ -89,7 +88,7 @@ def test_all_figures_are_written_for_papers_with_embedded_fonts(records: list[Ru
 @pytest.mark.slow
 @pytest.mark.program("pdflatex")
 def test_latex_reads_it(records: list[RunRecord], tmp_path: Path) -> None:
-    document = make_study_document(compare_problems(records), Manifest(settings=None, sessions=()))
+    document = make_study_document(compare_problems(records), StudyFile())
     FurtherFiles(latex=True, figures=True).write(tmp_path, compare_problems(records), document)
     (tmp_path / "page.tex").write_text(
         "\\documentclass{article}\n\\usepackage{booktabs,graphicx}\n\\begin{document}\n\\input{walk12-table}\n"

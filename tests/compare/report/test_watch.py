@@ -5,8 +5,7 @@ from pathlib import Path
 
 from compare.report import watch_report, write_report
 from compare.study.record import RunRecord
-from compare.study.record_files import name_run
-from compare.study.settings import Manifest
+from compare.study.study import StudyFile, name_record
 from tests.compare.records import record
 
 
@@ -44,9 +43,9 @@ def test_a_running_study_says_how_many_runs_have_ended(tmp_path: Path) -> None:
     """Three of four planned runs have ended; runs that another command planned do not count."""
     records = make_study(a=[0.9, 0.8], b=[0.7])
     others = ["walk/c-0000-00000000"]
-    planned = [name_run(one) for one in records]
-    manifest = Manifest(settings=None, sessions=(), runs=(*planned, "walk/b-0001-00000000", *others))
-    write_report(tmp_path, records, manifest)
+    planned = [name_record(one) for one in records]
+    file = StudyFile(runs=(*planned, "walk/b-0001-00000000", *others))
+    write_report(tmp_path, records, file)
     assert "3 of 4 runs have ended" in (tmp_path / "report.html").read_text()
-    write_report(tmp_path, records, replace(manifest, runs=(*planned, *others)))
+    write_report(tmp_path, records, replace(file, runs=(*planned, *others)))
     assert "runs have ended" not in (tmp_path / "report.html").read_text()

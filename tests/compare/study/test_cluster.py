@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from compare.study.record import RunRecord
-from compare.study.run_study import Study, run_study
+from compare.study.run import ProblemSpec, Stop
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.task import ProblemSpec, Stop, Task
+from compare.study.study import Study, run_study
 from nlp_gait.errors import InputError, WorkerError
 from tests.compare.study.test_study import contents
 from tests.extras import need
@@ -84,31 +84,31 @@ def test_workers_find_user_code_and_killed_processes_lose_no_run(
         client.wait_for_workers(2, timeout=60)
     finished: list[RunRecord] = []
 
-    def kill_a_worker(task: Task, record: RunRecord) -> None:
+    def kill_a_worker(record: RunRecord) -> None:
         if not finished:
             os.kill(workers[0].pid, signal.SIGKILL)
         finished.append(record)
 
-    run_study(Study(tasks=settings.tasks(), folder=tmp_path / "cluster", scheduler=address), progress=kill_a_worker)
+    run_study(Study(runs=settings.make_runs(), folder=tmp_path / "cluster", scheduler=address), progress=kill_a_worker)
     assert workers[0].wait(10) == -signal.SIGKILL and workers[1].poll() is None
-    run_study(Study(tasks=settings.tasks(), folder=tmp_path / "here"))
+    run_study(Study(runs=settings.make_runs(), folder=tmp_path / "here"))
     assert contents(tmp_path / "cluster") == contents(tmp_path / "here")
     finished.clear()
 
-    def kill_the_scheduler(task: Task, record: RunRecord) -> None:
+    def kill_the_scheduler(record: RunRecord) -> None:
         scheduler.kill()
         finished.append(record)
 
     more = replace(settings, solvers=(SolverSpec(name="own.py:search"),), runs=30, stop=Stop(evaluations=2000))
     with pytest.raises(WorkerError, match="failed: .*; finished runs are stored: rerun the same command to continue"):
-        study = Study(tasks=more.tasks(), folder=tmp_path / "lost", scheduler=address)
+        study = Study(runs=more.make_runs(), folder=tmp_path / "lost", scheduler=address)
         run_study(study, progress=kill_the_scheduler)
-    assert 0 < len(finished) == len(list((tmp_path / "lost" / "records").rglob("*.json"))) < len(more.tasks())
+    assert 0 < len(finished) == len(list((tmp_path / "lost" / "records").rglob("*.json"))) < len(more.make_runs())
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_no_scheduler_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("compare.study.run_study.CONNECT_TIMEOUT", "1s")
+    monkeypatch.setattr("compare.study.study.CONNECT_TIMEOUT", "1s")
     with pytest.raises(InputError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
-        run_study(Study(tasks=STUDY.tasks(), folder=tmp_path, scheduler="tcp://127.0.0.1:9"))
+        run_study(Study(runs=STUDY.make_runs(), folder=tmp_path, scheduler="tcp://127.0.0.1:9"))

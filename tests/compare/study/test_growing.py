@@ -10,12 +10,10 @@ from typing import Any
 
 import pytest
 
-from compare.study.evidence import read_evidence
 from compare.study.record import RunRecord
-from compare.study.record_files import RECORDS, read_records
-from compare.study.run_study import Study, run_study
-from compare.study.settings import SolverSpec, StudySettings, read_manifest
-from compare.study.task import Handling, ProblemSpec, Stop, Task, hash_solver_source
+from compare.study.run import Handling, ProblemSpec, Run, Stop, make_inputs
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.study import RECORDS, Study, read_records, read_study_file, run_study
 from tests.robots.custom import humanoid
 
 PSO, GA = SolverSpec(name="pso"), SolverSpec(name="ga")
@@ -25,7 +23,7 @@ STUDY = StudySettings(problems=(ProblemSpec(name="walk12"),), solvers=(PSO, GA),
 def grow(folder: Path, settings: StudySettings) -> tuple[list[RunRecord], int]:
     """Return the records of a study, and how many of them were stored before."""
     stored: list[int] = []
-    records = run_study(Study(tasks=settings.tasks(), folder=folder), on_stored=stored.append)
+    records = run_study(Study(runs=settings.make_runs(), folder=folder), on_stored=stored.append)
     return records, stored[0]
 
 
@@ -61,41 +59,37 @@ def test_other_inputs_never_overwrite_a_run_and_the_report_shows_the_latest(chan
     begun, _ = grow(tmp_path, first)
     records, stored = grow(tmp_path, other)
     assert stored == 0 and count_files(tmp_path) == 2
-    assert read_records(tmp_path) == records != begun
+    assert read_records(tmp_path) == (records, []) and records != begun
     assert grow(tmp_path, first) == (begun, 1)
-    evidence = read_evidence(tmp_path)
-    assert evidence.records == begun and not evidence.excluded
+    assert read_records(tmp_path) == (begun, [])
 
 
-def test_another_version_of_the_code_is_another_input(tmp_path: Path) -> None:
-    (task,) = replace(STUDY, solvers=(PSO,), runs=1).tasks()
-    (tmp_path / "mine.py").write_text("def search(f, lower, upper, evaluations, seed): f(lower[None])\n")
-    mine = replace(task, solver=f"{tmp_path}/mine.py:search")
-    polished = replace(task, polish=True)
-    keys = {task.inputs().key, replace(task.inputs(), code="f" * 64).key, mine.inputs().key, polished.inputs().key}
-    (tmp_path / "mine.py").write_text("def search(f, lower, upper, evaluations, seed): f(upper[None])\n")
-    edited = mine.inputs().key
-    assert len({*keys, edited}) == 5
-    (tmp_path / "mine.py").write_text("def search(f, lower, upper, evaluations, seed): f(upper[None])  # a remark\n")
-    assert mine.inputs().key == edited
+def find_key(run: Run) -> str:
+    (inputs,) = make_inputs([run])
+    return inputs.key
 
 
-def test_without_a_list_runs_of_one_name_and_other_inputs_are_not_mixed(tmp_path: Path) -> None:
-    grow(tmp_path, replace(STUDY, solvers=(PSO,)))
-    grow(tmp_path, replace(STUDY, solvers=(PSO,), stop=Stop(evaluations=300)))
-    (tmp_path / "study.json").unlink()
-    evidence = read_evidence(tmp_path)
-    assert len(evidence.records) == 2 and len({r.inputs.solver_key for r in evidence.records}) == 1
-    assert all("give the solvers different labels" in sentence for sentence in evidence.sentences)
+def test_an_edited_file_or_helper_is_another_input_and_a_moved_one_is_the_same(tmp_path: Path) -> None:
+    (run,) = replace(STUDY, solvers=(PSO,), runs=1).make_runs()
+    home, elsewhere = tmp_path / "home", tmp_path / "elsewhere"
+    home.mkdir()
+    (home / "mine.py").write_text("import sizes\ndef search(f, lower, upper, evaluations, seed): f(lower[None])\n")
+    keys = {find_key(run), find_key(replace(run, polish=True))}
+    for text in ("N = 1", "N = 2"):
+        (home / "sizes.py").write_text(text)
+        keys.add(find_key(replace(run, solver=f"{home}/mine.py:search")))
+    assert len(keys) == 4
+    home.rename(elsewhere)
+    assert find_key(replace(run, solver=f"{elsewhere}/mine.py:search")) in keys
 
 
 def test_a_gradient_run_depends_only_on_what_it_heeds() -> None:
-    def find_key(solver: str, **stop: Any) -> str:
-        return Task(problem=STUDY.problems[0], solver=solver, stop=Stop(**stop)).inputs().key
+    def find(solver: str, **stop: Any) -> str:
+        return find_key(Run(problem=STUDY.problems[0], solver=solver, stop=Stop(**stop)))
 
-    assert find_key("ipopt", evaluations=300) == find_key("ipopt", evaluations=400, target=0.5)
-    assert find_key("ipopt", time_limit_s=9.0) != find_key("ipopt")
-    assert find_key("slsqp", evaluations=300) != find_key("slsqp", evaluations=400)
+    assert find("ipopt", evaluations=300) == find("ipopt", evaluations=400, target=0.5)
+    assert find("ipopt", time_limit_s=9.0) != find("ipopt")
+    assert find("slsqp", evaluations=300) != find("slsqp", evaluations=400)
 
 
 @pytest.mark.slow
@@ -120,7 +114,7 @@ def test_a_robot_is_its_content_wherever_its_file_lies(
     (elsewhere / "my.json").write_text(json.dumps(heavier))
     monkeypatch.chdir(elsewhere)
     (second,), stored = grow(out, study("my.json"))
-    assert stored == 0 and second.verdict.objective != first.verdict.objective
+    assert stored == 0 and second.objective != first.objective
     monkeypatch.chdir(tmp_path)
     assert grow(out, study("my.json"))[1] == 1
 
@@ -128,7 +122,7 @@ def test_a_robot_is_its_content_wherever_its_file_lies(
 def test_the_list_of_runs_has_each_once_in_any_order_of_commands(tmp_path: Path) -> None:
     for settings in (STUDY, replace(STUDY, solvers=(GA,), runs=3), STUDY):
         grow(tmp_path, settings)
-    runs = read_manifest(tmp_path).runs
+    runs = read_study_file(tmp_path).runs
     assert sorted(name.rpartition("-")[0] for name in runs) == [
         f"walk12/{solver}-000{run}" for solver in ("ga", "pso") for run in (0, 1)
     ]
@@ -141,5 +135,10 @@ def test_an_algorithm_of_a_notebook_has_no_source_to_hash(monkeypatch: pytest.Mo
     text = "class Mine: ...\ndef search(f, lower, upper, evaluations, seed): ...\n"
     monkeypatch.setitem(linecache.cache, "/tmp/ipykernel_1/1.py", (len(text), None, text.splitlines(True), ""))
     exec(compile(text, "/tmp/ipykernel_1/1.py", "exec"), notebook.__dict__)
-    assert hash_solver_source(notebook.Mine()) is None and hash_solver_source(notebook.search) is None
-    assert hash_solver_source(test_an_algorithm_of_a_notebook_has_no_source_to_hash) is not None
+    for solver, has_file in ((notebook.search, False), (search, True)):
+        (inputs,) = make_inputs([Run(problem=STUDY.problems[0], solver=solver)])
+        assert ("file_sha256" in inputs.solver) == has_file
+
+
+def search(f: Any, lower: Any, upper: Any, evaluations: int, seed: int) -> None:
+    f(lower)

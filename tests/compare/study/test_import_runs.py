@@ -14,10 +14,11 @@ from compare.analysis.comparison import compare_problems
 from compare.analysis.headline import describe_unknown
 from compare.judge import evaluate
 from compare.study.import_runs import import_runs, read_imported_records, read_points
-from compare.study.record_files import read_records, write_records
-from compare.study.task import ProblemSpec
+from compare.study.run import ProblemSpec, Run
+from compare.study.study import read_records, write_records
 from nlp_gait.errors import GaitError
 from tests.compare.cli.calls import nlp_gait
+from tests.compare.records import run_once
 
 pytestmark = pytest.mark.usefixtures("coarse_pages")
 
@@ -38,14 +39,14 @@ def finals(folder: Path, *, header: bool = True, extra: dict[str, list[object]] 
 def test_each_row_is_a_judged_record(tmp_path: Path) -> None:
     extra = {"run": [4, 5, 6], "objective": [0.5, "", 0.7], "violation": [0, 0, 2.5], "evaluations": [100, 200, 300]}
     records = import_runs(WALK, finals(tmp_path, extra=extra), "GA (MATLAB)")
-    assert [(r.run, r.claimed, r.claimed_objective, r.evaluations["f"]) for r in records] == [
+    assert [(r.run, r.reported_feasible, r.reported_objective, r.counts["f"]) for r in records] == [
         (4, True, 0.5, 100),
         (5, False, None, 200),
         (6, False, 0.7, 300),
     ]
     for record, x in zip(records, POINTS, strict=True):
         own = evaluate(PROBLEM, x)
-        assert (record.verdict.objective, record.verdict.violation) == (own.objective["value"], own.violation)
+        assert (record.objective, record.violation) == (own.objective["value"], own.violation)
         assert math.isnan(record.time_s.solve) and list(record.x.values()) == x.tolist()
 
 
@@ -88,7 +89,7 @@ def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_pat
     out = tmp_path / "study"
     extra: dict[str, list[object]] = {"evaluations": [100, "", ""], "time_s": ["", 2.0, ""]}
     partly = import_runs(WALK, finals(tmp_path, extra=extra), "paper")
-    assert [dict(r.evaluations) for r in partly] == [{"f": 100}, {}, {}]
+    assert [dict(r.counts) for r in partly] == [{"f": 100}, {}, {}]
     assert math.isnan(partly[0].time_s.solve) and partly[1].time_s.solve == 2.0
     write_records([*partly, *import_runs(WALK, finals(tmp_path), "GA", evaluations=50)], out)
     done = nlp_gait("import", "walk12", finals(tmp_path), "--as", "thesis", "--out", out, "--json")
@@ -97,7 +98,7 @@ def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_pat
     for unknown in (summaries["paper"], summaries["thesis"]):
         assert unknown["evaluations"] is None and unknown["evaluations_to_1"] is None
     assert summaries["GA"]["evaluations"] == 50 and summaries["thesis"]["best"] == summaries["GA"]["best"]
-    (comparison,) = compare_problems(read_records(out))
+    (comparison,) = compare_problems(read_records(out)[0])
     header, rows = format_rows(comparison, ALL)
     assert rows[-1][header.index("evaluations")] == "-"
     page = " ".join((out / "report.md").read_text().split())
@@ -157,29 +158,40 @@ def test_values_missing_from_a_file_are_filled_in_and_others_stay(tmp_path: Path
     with pytest.raises(GaitError, match="a run is duplicated"):
         import_runs(WALK, finals(tmp_path, extra={"run": [1, 1, 2]}), "ga", evaluations=3)
     plain = import_runs(WALK, finals(tmp_path), "ga", evaluations=3)
-    assert [(r.run, r.seed, r.evaluations, r.claimed, r.claimed_violation) for r in plain] == [
-        (k, k, {"f": 3}, False, None) for k in range(3)
+    assert [(r.run, r.seed, r.counts, r.reported_feasible) for r in plain] == [
+        (k, k, {"f": 3}, False) for k in range(3)
     ]
     for record in plain:
-        assert record.history.objective == (record.verdict.objective if record.verdict.feasible else None,)
+        assert record.history.objective == (record.objective if record.feasible else None,)
         assert (record.failed_evaluations, record.iterations) == (0, 0)
     said = {"seed": [7, 8, 9], "time_s": [0.5, "", 2.0], "objective": [1, 2, 3]}
     full = import_runs(WALK, finals(tmp_path, extra=said), "ga", evaluations=3)
-    assert [(r.seed, r.claimed, r.inputs.seed) for r in full] == [(7, True, 7), (8, True, 8), (9, True, 9)]
+    assert [(r.seed, r.reported_feasible, r.inputs.seed) for r in full] == [(7, True, 7), (8, True, 8), (9, True, 9)]
     assert (full[0].time_s.solve, full[2].time_s.history) == (0.5, (2.0,)) and math.isnan(full[1].time_s.solve)
     keys = {r.inputs.imported for r in (*plain, *full)}
     assert len(keys) == 6
     (tmp_path / "h.csv").write_text("run,evaluations,objective\n0,10,\n0,10,0.5\n1,10,0.5\n2,10,0.5\n")
     first, second, _ = import_runs(WALK, finals(tmp_path), "ga", tmp_path / "h.csv", evaluations=3)
-    assert first.history.evaluations == (10, 10) and second.evaluations == {"f": 10}
+    assert first.history.evaluations == (10, 10) and second.counts == {"f": 10}
     assert len(first.time_s.history) == 2 and math.isnan(first.time_s.solve)
 
 
 def test_records_from_elsewhere_belong_to_the_very_problem(tmp_path: Path) -> None:
     """Another value of a parameter is another problem; a folder without records has none."""
     own = import_runs(WALK, finals(tmp_path), "ga", evaluations=3)
-    assert read_imported_records(tmp_path / "absent", own) == ([], [])
+    assert read_imported_records(tmp_path / "absent", own) == []
     write_records(own, tmp_path)
-    assert [record.run for record in read_imported_records(tmp_path, own).records] == [0, 1, 2]
+    assert [record.run for record in read_imported_records(tmp_path, own)] == [0, 1, 2]
     other = import_runs(ProblemSpec(name="walk12", values={"lambda": 0.5}), finals(tmp_path), "ga", evaluations=3)
-    assert read_imported_records(tmp_path, other) == ([], [])
+    assert read_imported_records(tmp_path, other) == []
+
+
+def test_a_history_is_cut_where_its_run_cannot_have_been(tmp_path: Path) -> None:
+    """Better than the judged end of the run, or than the proven bound; its length stays."""
+    best = run_once(Run(problem=WALK, solver="ipopt"))
+    (tmp_path / "f.csv").write_text(",".join(PROBLEM.names) + "\n" + ",".join(map(repr, best.x.values())) + "\n")
+    (tmp_path / "h.csv").write_text(f"run,evaluations,objective\n0,100,5.0\n0,200,{best.objective - 0.1}\n0,300,2.0\n")
+    (record,) = import_runs(WALK, tmp_path / "f.csv", "ga", tmp_path / "h.csv")
+    assert record.history.evaluations == (200, 300)
+    assert record.history.objective == (best.objective - 0.1, record.objective)
+    assert record.status.endswith("; 2 values of its history left out: better than its point, or than the proven bound")

@@ -13,17 +13,16 @@ import pytest
 from casadi import MX
 
 from compare.judge import evaluate
+from compare.study.perform import catch_errors
 from compare.study.record import History, RunRecord, Times, read_record
-from compare.study.record_files import read_records, write_record
-from compare.study.run_study import Study, check_study, run_study
-from compare.study.run_task import try_task
-from compare.study.task import ProblemSpec, Stop, Task
+from compare.study.run import ProblemSpec, Run, Stop, make_inputs
+from compare.study.study import Study, read_records, run_study, write_record
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation.registry import check_mathematics
 from tests.backends.toys import row, toy
-from tests.compare.records import judged
+from tests.compare.records import judged, run_once
 
-TASK = Task(problem=ProblemSpec(name="walk12"), solver="random", stop=Stop(evaluations=50))
+RUN = Run(problem=ProblemSpec(name="walk12"), solver="random", stop=Stop(evaluations=50))
 TEXTS = ("caf\udce9.csv", "\x00\x1b[31m", "a\nb\u2028c", "$x$", "x" * 10**4, "=HYPERLINK(1)", "\ud83d", "", "\u202e")
 NUMBERS = (math.nan, math.inf, -1.0, 2**63, 10**400, True, None)
 
@@ -41,14 +40,13 @@ def hostile_results(record: RunRecord, seed: int) -> Iterator[Callable[[], RunRe
         return lambda: replace(record, **parts)
 
     for value in values:
-        yield change(status=value)
         yield change(settings={"kind": value})
         yield change(x={**record.x, "lambda": value})
-        for name in ("claimed_objective", "failed_evaluations", "iterations", "claimed"):
+        for name in ("status", "reported_objective", "failed_evaluations", "iterations", "reported_feasible"):
             yield change(**{name: value})
-        for name in ("objective", "violation", "feasible", "indexes", "violated"):
-            yield change(verdict=replace(record.verdict, **{name: value}))
-        yield change(evaluations={"f": value})
+        for name in ("objective", "violation", "feasible", "metrics", "violated"):
+            yield change(**{name: value})
+        yield change(counts={"f": value})
         yield change(history=History(evaluations=(1,) * 2, objective=(1.0, value)), time_s=times(2))
         yield change(history=History(evaluations=(1, draw.choice(values)), objective=(1.0, 1.0)), time_s=times(2))
         yield change(time_s=Times(solve=draw.choice(values), history=record.time_s.history))
@@ -69,11 +67,11 @@ def fail(error: BaseException) -> RunRecord:
 @pytest.mark.slow
 def test_no_result_of_a_run_makes_a_record_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.study.record.LARGEST_FILE", 2**20)
-    sound = judged("random", dict.fromkeys(TASK.problem.load().names, 0.1), problem="walk12")
-    attacks = list(hostile_results(sound, 1))
+    sound = judged("random", dict.fromkeys(RUN.problem.load().names, 0.1), problem="walk12")
+    attacks, (inputs,) = list(hostile_results(sound, 1)), make_inputs([RUN])
     failed = 0
     for make in attacks:
-        record = try_task(TASK, run=lambda task, make=make: make())
+        record = catch_errors(RUN, inputs, make)
         path = write_record(record, tmp_path)
         read = read_record(path)
         assert read.to_json() == json.loads(path.read_text(encoding="utf-8"))
@@ -85,22 +83,23 @@ def test_a_value_that_is_not_finite_at_a_feasible_point_is_a_failure(tmp_path: P
     def make(x: MX, y: MX, limit: MX, ops: object) -> tuple[MX, tuple[Any, ...]]:
         return (x - 9).log(), (row(x, upper=limit + 9),)
 
-    tasks = [
-        Task(problem=ProblemSpec(name=toy(make)), solver=name, run=k) for name in ("random", "slsqp") for k in (0, 1)
+    problem = ProblemSpec(name=toy(make))
+    runs = [
+        Run(problem=problem, solver=name, number=k, stop=Stop(evaluations=60))
+        for name in ("random", "slsqp")
+        for k in (0, 1)
     ]
-    tasks = [replace(task, stop=Stop(evaluations=60)) for task in tasks]
-    records = run_study(Study(tasks=tuple(tasks), folder=tmp_path))
+    records = run_study(Study(runs=tuple(runs), folder=tmp_path))
     assert ["without an objective" in record.status for record in records] == [True] * 4
     assert not any(record.x for record in records)
-    assert len(read_records(tmp_path)) == 4
+    assert len(read_records(tmp_path)[0]) == 4
 
 
 @pytest.mark.parametrize("value", [2**70, deep(60), "\udce9", {"a": "\ud83d"}])
 def test_settings_that_no_record_can_contain_are_rejected_before_the_work(tmp_path: Path, value: Any) -> None:
-    (tmp_path / "own.py").write_text("def search(f, lower, upper, evaluations, seed, setting): ...\n")
-    task = replace(TASK, solver=f"{tmp_path}/own.py:search", settings={"setting": value})
+    (tmp_path / "own.py").write_text("def search(f, lower, upper, evaluations, seed, setting): raise RuntimeError\n")
     with pytest.raises(InputError):
-        check_study(Study(tasks=(task,)))
+        run_once(replace(RUN, solver=f"{tmp_path}/own.py:search", settings={"setting": value}))
 
 
 @pytest.mark.parametrize("end", ["lower", "upper"])
@@ -123,8 +122,8 @@ def test_an_algorithm_that_changes_the_working_folder_keeps_its_run(
         " with tempfile.TemporaryDirectory() as folder:\n  os.chdir(folder)\n  f(lower[None])\n"
     )
     monkeypatch.chdir(tmp_path)
-    record = try_task(replace(TASK, solver="own.py:search"))
+    record = run_once(replace(RUN, solver="own.py:search"))
     assert record.x and not record.status.startswith("failed"), record.status
     with pytest.raises(GaitError):
-        check_study(Study(tasks=(replace(TASK, solver="gone.py:search"),)))
+        run_once(replace(RUN, solver="gone.py:search"))
     assert Path(os.getcwd()) == tmp_path

@@ -18,14 +18,13 @@ import numpy as np
 import pytest
 
 from compare.study.record import SCHEMA, read_record
-from compare.study.record_files import locate_record, read_records
-from compare.study.run_study import Study, run_study
-from compare.study.run_task import try_task
-from compare.study.settings import SolverSpec, StudySettings, parse_settings, read_manifest, read_settings
-from compare.study.task import Handling, ProblemSpec, Stop, Task
+from compare.study.run import Handling, ProblemSpec, Run, Stop
+from compare.study.settings import SolverSpec, StudySettings, parse_settings, read_settings
+from compare.study.study import Study, read_records, read_study_file, run_study, write_record
 from metaheuristics import ParticleSwarm, SearchError
 from metaheuristics.interface import Array, Start
 from nlp_gait.errors import GaitError, InputError
+from tests.compare.records import run_once
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "bring_your_own.py"
 SSP = ProblemSpec(name="nao-ssp")
@@ -54,30 +53,30 @@ def contents(folder: Path) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("undisturbed")
-    run_study(Study(tasks=SMALL.tasks(), folder=folder))
+    run_study(Study(runs=SMALL.make_runs(), folder=folder))
     return folder
 
 
 @pytest.mark.slow
 def test_each_run_has_one_file_named_after_its_inputs(undisturbed: Path) -> None:
     names = [f"walk12/{solver}-000{run}" for solver in ("ga", "pso", "pso+ipopt", "pso-20") for run in (0, 1)]
-    runs = read_manifest(undisturbed).runs
+    runs = read_study_file(undisturbed).runs
     assert sorted(contents(undisturbed)) == sorted(f"records/{name}.json" for name in runs)
     assert sorted(name.rpartition("-")[0] for name in runs) == sorted(names)
 
 
 @pytest.mark.slow
 def test_many_workers_give_the_same_files(undisturbed: Path, tmp_path: Path) -> None:
-    run_study(Study(tasks=SMALL.tasks(), folder=tmp_path, jobs=2))
+    run_study(Study(runs=SMALL.make_runs(), folder=tmp_path, jobs=2))
     assert contents(tmp_path) == contents(undisturbed)
 
 
 def test_a_polished_run_carries_the_search_before_it(undisturbed: Path) -> None:
-    records = {record.solver: record for record in read_records(undisturbed) if record.run == 1}
+    records = {record.solver: record for record in read_records(undisturbed)[0] if record.run == 1}
     search, polished = records["pso"], records["pso+ipopt"]
-    assert polished.verdict.feasible and polished.verdict.objective == pytest.approx(0.970839, rel=1e-5)
-    assert polished.verdict.objective > search.verdict.objective  # maximised
-    assert polished.evaluations["f"] > search.evaluations["f"] == 500 and polished.evaluations["jacobian"] > 0
+    assert polished.feasible and polished.objective == pytest.approx(0.970839, rel=1e-5)
+    assert polished.objective > search.objective  # maximised
+    assert polished.counts["f"] > search.counts["f"] == 500 and polished.counts["jacobian"] > 0
     assert polished.history.evaluations[:-1] == search.history.evaluations
     assert polished.time_s.solve > search.time_s.solve
     assert polished.time_s.history[:-1] == search.time_s.history  # it is that run, not a repeated one
@@ -85,28 +84,28 @@ def test_a_polished_run_carries_the_search_before_it(undisturbed: Path) -> None:
 
 
 def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
-    task = SMALL.tasks()[0]
-    path = locate_record(tmp_path, task)
-    path.parent.mkdir(parents=True)
-    good = locate_record(undisturbed, task).read_text()
+    run = SMALL.make_runs()[0]
+    (record,) = [r for r in read_records(undisturbed)[0] if (r.solver, r.run) == (run.title, run.number)]
+    path = write_record(record, tmp_path)
+    good = path.read_text()
     for text, message in (
         (good[: len(good) // 2], "is not valid JSON"),
         ("[]", f"'schema' must be {SCHEMA}, got 'list'"),
         (good.replace(f'"schema": {SCHEMA}', '"schema": 0'), f"'schema' must be {SCHEMA}, got 0"),
         (good.replace('"history": {', '"history": 3, "other": {'), "damaged"),
-        (good.replace(' "failed_evaluations": 0,\n', ""), "it must have every field"),
-        (good.replace('  "feasible": true,\n', ""), "it must have every field"),
+        (good.replace(' "failed_evaluations": 0,\n', ""), "failed_evaluations is missing"),
+        (good.replace(' "feasible": true,\n', ""), "feasible is missing"),
     ):
         path.write_text(text)
         with pytest.raises(InputError, match=message):
-            run_study(Study(tasks=(task,), folder=tmp_path))
+            run_study(Study(runs=(run,), folder=tmp_path))
 
 
 @pytest.mark.slow
 def test_killed_at_a_random_moment_and_resumed_it_ends_as_undisturbed(undisturbed: Path, tmp_path: Path) -> None:
     program = (
         "import sys; from pathlib import Path; from tests.compare.study.test_study import SMALL, Study, run_study\n"
-        "if __name__ == '__main__': run_study(Study(tasks=SMALL.tasks(), folder=Path(sys.argv[1]), jobs=2))"
+        "if __name__ == '__main__': run_study(Study(runs=SMALL.make_runs(), folder=Path(sys.argv[1]), jobs=2))"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", program, str(tmp_path)], cwd=Path(__file__).parents[3], start_new_session=True
@@ -118,7 +117,7 @@ def test_killed_at_a_random_moment_and_resumed_it_ends_as_undisturbed(undisturbe
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     assert all(read_record(path) for path in tmp_path.glob("records/*/*.json"))  # whole or absent
-    run_study(Study(tasks=SMALL.tasks(), folder=tmp_path))
+    run_study(Study(runs=SMALL.make_runs(), folder=tmp_path))
     assert contents(tmp_path) == contents(undisturbed)
 
 
@@ -147,12 +146,12 @@ class Broken:
 
 @pytest.mark.slow
 def test_a_run_that_raises_is_a_record_with_the_reason(tmp_path: Path) -> None:
-    tasks = (Task(problem=SSP, solver=Broken()), Task(problem=SSP, solver="pso", stop=Stop(evaluations=100)))
-    broken, good = run_study(Study(tasks=tasks, folder=tmp_path))
-    assert broken.status == "failed: RuntimeError: no <luck>" and not broken.claimed and not broken.verdict.feasible
-    assert good.evaluations == {"f": 100}
-    again = next(r for r in read_records(tmp_path) if r.solver == "broken")
-    assert again.status == broken.status and np.isnan(again.verdict.objective) and again.x == {}
+    tasks = (Run(problem=SSP, solver=Broken()), Run(problem=SSP, solver="pso", stop=Stop(evaluations=100)))
+    broken, good = run_study(Study(runs=tasks, folder=tmp_path))
+    assert broken.status == "failed: RuntimeError: no <luck>" and not broken.reported_feasible and not broken.feasible
+    assert good.counts == {"f": 100}
+    again = next(r for r in read_records(tmp_path)[0] if r.solver == "broken")
+    assert again.status == broken.status and np.isnan(again.objective) and again.x == {}
 
 
 def test_polishing_a_failed_run_is_a_failure_too(tmp_path: Path) -> None:
@@ -161,49 +160,50 @@ def test_polishing_a_failed_run_is_a_failure_too(tmp_path: Path) -> None:
         (Broken(), "RuntimeError: no <luck>"),
         (f"{tmp_path}/own.py:search", "has no point to polish"),
     ):
-        polished = try_task(Task(problem=SSP, solver=solver, polish=True))
+        polished = run_once(Run(problem=SSP, solver=solver, polish=True))
         assert reason in polished.status and not polished.x and polished.inputs.polish
 
 
 @pytest.mark.slow
-def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -> None:
-    light = ProblemSpec(name="walk12")  # six workers build it
-    tasks = tuple(Task(problem=light, solver=Broken(deadly=True), run=run) for run in range(2))
-    with pytest.raises(GaitError, match="worker process died 3 times in a row"):
-        run_study(Study(tasks=tasks, folder=tmp_path, jobs=2))
+def test_a_run_that_takes_its_process_with_it_is_failed_and_the_others_are_complete(tmp_path: Path) -> None:
+    light = ProblemSpec(name="walk12")
+    runs = tuple(Run(problem=light, solver=Broken(deadly=True), label=f"deadly-{k}") for k in range(2))
+    *deadly, good = run_study(Study(runs=(*runs, Run(problem=light, solver="random")), folder=tmp_path, jobs=2))
+    assert all("its process ended without a result, by signal SIGKILL" in record.status for record in deadly)
+    assert good.counts == {"f": 10_000}
 
 
 @pytest.mark.parametrize(
     ("task", "message"),
     [
-        (Task(problem=SSP, solver="psoo"), "unknown algorithm 'psoo'; did you mean"),
-        (Task(problem=SSP, solver="pso", settings={"inertial": 1}), "no setting 'inertial'"),
-        (Task(problem=SSP, solver="ipopt", settings={"tol": 1}), "unknown setting of ipopt 'tol'"),
-        (Task(problem=SSP, solver="slsqp", settings={"tol": 1}), "unknown setting of slsqp 'tol'"),
-        (Task(problem=SSP, solver="slsqp", stop=Stop(evaluations=9)), "at least 10 evaluations"),
-        (Task(problem=SSP, solver="pso", stop=Stop(evaluations=9)), "population of 'pso', 50, got 9"),
-        (Task(problem=SSP, solver="pso", handling=Handling(name="penalty")), "needs a value for 'weight'"),
-        (Task(problem=SSP, solver="pso", handling=Handling(name="debb")), "unknown constraint handling 'debb'"),
-        (Task(problem=SSP, solver="ipopt", stop=Stop(time_limit_s=0.0)), "time_limit_s must be"),
-        (Task(problem=SSP, solver="pso", label="../../etc"), "label has 1 to 64 letters"),
-        (Task(problem=SSP, solver="pso", seed=2**63 - 1, run=1), "64 bits"),
-        (Task(problem=ProblemSpec(name="nao-spp"), solver="pso"), "unknown problem"),
-        (Task(problem=SSP, solver="pymoo:XYZ"), "unknown algorithm 'pymoo:XYZ'"),
-        (Task(problem=SSP, solver="none.py:A"), "cannot be read: No such file"),
-        (Task(problem=SSP, solver="nowhere_at_all:A"), "is installed; name a file as nowhere_at_all.py:A"),
-        (Task(problem=SSP, solver=f"{EXAMPLE}:Shrinkin"), "did you mean 'Shrinking'"),
+        (Run(problem=SSP, solver="psoo"), "unknown algorithm 'psoo'; did you mean"),
+        (Run(problem=SSP, solver="pso", settings={"inertial": 1}), "no setting 'inertial'"),
+        (Run(problem=SSP, solver="ipopt", settings={"tol": 1}), "unknown setting of ipopt 'tol'"),
+        (Run(problem=SSP, solver="slsqp", settings={"tol": 1}), "unknown setting of slsqp 'tol'"),
+        (Run(problem=SSP, solver="slsqp", stop=Stop(evaluations=9)), "at least 10 evaluations"),
+        (Run(problem=SSP, solver="pso", stop=Stop(evaluations=9)), "population of 'pso', 50, got 9"),
+        (Run(problem=SSP, solver="pso", handling=Handling(name="penalty")), "needs a value for 'weight'"),
+        (Run(problem=SSP, solver="pso", handling=Handling(name="debb")), "unknown constraint handling 'debb'"),
+        (Run(problem=SSP, solver="ipopt", stop=Stop(time_limit_s=0.0)), "time_limit_s must be"),
+        (Run(problem=SSP, solver="pso", label="../../etc"), "label has 1 to 64 letters"),
+        (Run(problem=SSP, solver="pso", seed=2**63 - 1, number=1), "64 bits"),
+        (Run(problem=ProblemSpec(name="nao-spp"), solver="pso"), "unknown problem"),
+        (Run(problem=SSP, solver="pymoo:XYZ"), "unknown algorithm 'pymoo:XYZ'"),
+        (Run(problem=SSP, solver="none.py:A"), "cannot be read: No such file"),
+        (Run(problem=SSP, solver="nowhere_at_all:A"), "is installed; name a file as nowhere_at_all.py:A"),
+        (Run(problem=SSP, solver=f"{EXAMPLE}:Shrinkin"), "did you mean 'Shrinking'"),
     ],
 )
-def test_what_cannot_run_is_reported_before_the_work(task: Task, message: str, tmp_path: Path) -> None:
+def test_what_cannot_run_is_reported_before_the_work(task: Run, message: str, tmp_path: Path) -> None:
     with pytest.raises((GaitError, SearchError), match=message):
-        run_study(Study(tasks=(task,), folder=tmp_path))
+        run_study(Study(runs=(task,), folder=tmp_path))
     assert not list(tmp_path.rglob("*.json"))
 
 
 def test_two_solvers_of_one_name_are_refused() -> None:
-    task = Task(problem=SSP, solver="pso")
+    task = Run(problem=SSP, solver="pso")
     with pytest.raises(InputError, match="give them different labels"):
-        Study(tasks=(task, replace(task, settings={"population": 20})))
+        Study(runs=(task, replace(task, settings={"population": 20})))
 
 
 TOML = """
@@ -236,17 +236,17 @@ def test_study_file(tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     path.write_text(TOML)
     settings = read_settings(path)
-    tasks = settings.tasks()
-    assert [(t.title, t.run_seed) for t in tasks] == [
+    runs = settings.make_runs()
+    assert [(t.title, t.run_seed) for t in runs] == [
         ("ipopt", 5),
         ("ipopt", 6),
         *(("small-pso", seed) for seed in (5, 6, 7)),
         *(("small-pso+ipopt", seed) for seed in (5, 6, 7)),
     ]
-    problem = tasks[0].problem.load()
+    problem = runs[0].problem.load()
     assert problem.options["robot"] == "nao-v6" and problem.value("swing_height_m.upper") == 0.02
-    assert tasks[2].make_search() == ParticleSwarm(population=20) and tasks[2].stop == Stop(evaluations=700, target=0.9)
-    assert parse_settings(json.loads(json.dumps(settings.to_json())), "again").tasks() == tasks
+    assert runs[2].make_search() == ParticleSwarm(population=20) and runs[2].stop == Stop(evaluations=700, target=0.9)
+    assert parse_settings(json.loads(json.dumps(settings.to_json())), "again").make_runs() == runs
 
 
 @pytest.mark.parametrize(
@@ -270,7 +270,7 @@ def test_bad_study_files_are_one_sentence(change: tuple[str, str], message: str,
     path = tmp_path / "study.toml"
     path.write_text(TOML.replace(*change, 1))
     with pytest.raises(GaitError, match=message):
-        for task in read_settings(path).tasks():
+        for task in read_settings(path).make_runs():
             task.problem.load()
 
 

@@ -1,9 +1,9 @@
-"""What to run, as plain data for files and other processes, and the inputs of a run, from which its file is named."""
+"""What to run, as plain data, and the inputs of a run: everything that its result depends on, from which its file is named."""
 
 import inspect
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from compare.study.origin import hash_installed_code
 from metaheuristics import EarlyStop
 from metaheuristics.external_program import ExternalProgram
 from metaheuristics.interface import Algorithm
 from metaheuristics.preparation import check_budget
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, make_algorithm, make_handling
 from metaheuristics.user_algorithm import PlainFunction, to_algorithm
-from nlp_gait.backends.identity import hash_json, identify_problem, make_key
+from nlp_gait import __version__
+from nlp_gait.backends.identity import hash_formulas, hash_json, identify_problem, make_key
 from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solver
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
@@ -28,15 +28,17 @@ from nlp_gait.formulation.registry import check_options, find_maker, hash_files,
 from nlp_gait.gaitbench.generated import resolve_name
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import (
+    SourceFiles,
     check_reference,
     find_entry_points,
-    hash_file,
-    hash_source,
+    forget_code,
     is_program,
     is_user_code,
     load_object,
     parse_command,
+    read_source_files,
     shorten_name,
+    shorten_reference,
 )
 
 IPOPT = "ipopt"
@@ -44,8 +46,7 @@ GRADIENT_SOLVERS = tuple(SOLVERS)
 LABEL = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9._+:() -]{0,62}[A-Za-z0-9._+:()-])?")
 PYMOO = "pymoo:"  # prefix of names that are not user code
 FUNCTION = "function"  # kind of a plain function in settings
-SOURCE = "source_sha256"  # of user code, see ``hash_file``
-KEY_DIGITS = 8
+KEY_DIGITS = 16
 # Replaces a user-defined solver in checks before its code runs.
 UNREAD: Any = PlainFunction(function=lambda f, lower, upper, evaluations, seed: None, name="own")
 
@@ -68,7 +69,7 @@ class ProblemSpec:
     label: str = ""  #: its name in a study; empty for ``name``, without file or module
 
     def __post_init__(self) -> None:
-        """Take the id of an instance of GaitBench for its problem, its option and its label."""
+        """Replace the id of an instance of GaitBench by its problem, its option and its label."""
         if isinstance(self.name, str):
             name, instance = resolve_name(self.name)
             if instance:
@@ -91,7 +92,7 @@ class ProblemSpec:
         return replace(self, options={**self.options, **options})
 
     def load(self) -> GaitProblem:
-        """Return the problem; each is built once in a process, as long as its robot and source do not change."""
+        """Return the problem; each is built once in a process, as long as its files do not change."""
         if isinstance(self.name, GaitProblem):
             if self.options:
                 raise InputError(
@@ -99,9 +100,9 @@ class ProblemSpec:
                 )
             return self.name.with_values(**self.values)
         check_options(find_maker(self.name), self.options)  # before the cache, to which True and 1 are the same
-        contents = hash_source(self.name, "problem") if self.name not in PROBLEMS else ""
-        options = tuple(sorted(self.options.items()))
-        return _load(self.name, options, (contents, *hash_files(self.options).values())).with_values(**self.values)
+        code = "" if self.name in PROBLEMS else read_source_files(self.name, "problem").digest
+        contents = (code, *hash_files(self.options).values())
+        return _load(self.name, tuple(sorted(self.options.items())), contents).with_values(**self.values)
 
 
 @lru_cache(maxsize=16)
@@ -141,13 +142,13 @@ class Stop:
 class Inputs:
     """Everything that the result of a run depends on."""
 
-    problem: Mapping[str, Any]  #: how to load it, and its probes, see ``identify_problem``
+    problem: Mapping[str, Any]  #: see ``identify_problem``
     objective: Objective
-    #: Name; of user code its name and hash; of an object its settings, and the hash of its file if there is one
-    solver: str | Mapping[str, Any]
-    settings: Mapping[str, Any]  #: of the solver, that differ from its defaults
+    solver: str | Mapping[str, Any]  #: its name, user code as the user named it, or the settings of an object
     seed: int  #: of this run
-    code: str = ""  #: hash of the installed code that runs solvers; empty for imported results
+    version: str = ""  #: of nlp-gait; empty for imported results
+    settings: Mapping[str, Any] = field(default_factory=dict)  #: of the solver, that differ from its defaults
+    code: str = ""  #: hash of the files of a user-defined solver
     handling: Handling | None = None  #: of a search
     stop: Mapping[str, Any] = field(default_factory=dict)  #: criteria that the solver heeds, as in ``Stop``
     polish: bool = False  #: whether IPOPT continues from the end of the search
@@ -156,29 +157,19 @@ class Inputs:
 
     @property
     def is_search(self) -> bool:
-        """Whether the run ends with a search, so that its claims and history are exact."""
+        """Whether the run ends with a search, so that its history is exact."""
         return self.handling is not None and not self.polish
 
     @cached_property
     def key(self) -> str:
-        """Hash of all inputs for the name of a file: without paths, and of the problem's probes six digits."""
-        return hash_json(self._list())[:KEY_DIGITS]
-
-    @cached_property
-    def solver_key(self) -> str:
-        """Hash of what all runs of a solver on a problem share."""
-        return hash_json({**self._list(), "seed": 0, "start": {}, "imported": bool(self.imported)})
-
-    def _list(self) -> dict[str, Any]:
-        solver = self.solver
-        if isinstance(solver, Mapping) and "name" in solver:
-            solver = {**solver, "name": shorten_name(solver["name"])}
-        return {**replace_nan(self), "problem": make_key(self.problem), "solver": solver}
+        """Hash of all inputs, for the name of a file; the same wherever the user's files lie."""
+        solver = shorten_reference(self.solver) if isinstance(self.solver, str) else self.solver
+        return hash_json({**replace_nan(self), "problem": make_key(self.problem), "solver": solver})[:KEY_DIGITS]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
-    """One run."""
+class Run:
+    """One run of a solver on a problem."""
 
     problem: ProblemSpec
     #: name, or user code as ``file.py:name``, ``module:name`` or ``cmd:COMMAND``, or a picklable search algorithm or plain
@@ -188,7 +179,7 @@ class Task:
     handling: Handling = field(default_factory=Handling)  #: of constraints, in searches
     stop: Stop = field(default_factory=Stop)  #: criteria
     seed: int = 0  #: of the study
-    run: int = 0  #: number of the run; its seed is ``seed + run``, so that equal runs of all solvers start alike
+    number: int = 0  #: its seed is ``seed + number``, so that equal runs of all solvers start alike
     label: str = ""  #: of the solver in the study; empty for its name
     polish: bool = False  #: whether IPOPT continues from the end of a search
     #: Values of all variables by name at which an NLP solver starts; empty for a random point
@@ -197,7 +188,7 @@ class Task:
     @property
     def run_seed(self) -> int:
         """Seed of this run."""
-        return self.seed + self.run
+        return self.seed + self.number
 
     @property
     def title(self) -> str:
@@ -220,43 +211,16 @@ class Task:
         """True for metaheuristics, False for gradient methods."""
         return self.solver not in GRADIENT_SOLVERS
 
-    def inputs(self) -> Inputs:
-        """Return everything that the result depends on, as plain data; raises InputError for settings that are not plain."""
-        problem, setting_names = self.problem.load(), () if self.is_search else list_settings(str(self.solver))
-        limits = self.stop.limits
-        if not self.is_search and "evaluations" not in setting_names:  # it ends by itself, or by the clock
-            limits = {key: value for key, value in limits.items() if key == "time_limit_s"}
-        try:
-            solver, settings = json.loads(json.dumps([self._describe_solver(), dict(self.settings)], allow_nan=False))
-        except (TypeError, ValueError) as error:
-            raise InputError(f"settings of {self.title!r} must be numbers, texts and lists: {error}") from error
-        return Inputs(
-            problem=identify_problem(problem),
-            objective=problem.objective,
-            solver=solver,
-            settings=settings,
-            seed=self.run_seed,
-            code=hash_installed_code(),
-            handling=self.handling if self.is_search else None,
-            stop=limits,
-            polish=self.polish,
-            start=dict(self.start),
-        )
+    def read_code(self) -> SourceFiles | None:
+        """Return the files of a solver that is user code by name, as they are now; None for other solvers."""
+        return read_source_files(str(self.solver), "algorithm") if self.is_user_code else None
 
-    def _describe_solver(self) -> str | dict[str, Any]:
-        if not isinstance(self.solver, str):
-            source = hash_solver_source(self.solver)
-            return {**describe_settings(self.solver), **({} if source is None else {SOURCE: source})}
-        if self.is_user_code:
-            return {"name": self.solver, SOURCE: hash_source(self.solver, "algorithm")}
-        return self.solver
-
-    def make_search(self) -> Algorithm:
+    def make_search(self, files: SourceFiles | None = None) -> Algorithm:
         """Return the search with its settings; this first runs user code. Raises SearchError for no search, and UserCodeError."""
         if isinstance(self.solver, str) and is_program(self.solver):
             program = ExternalProgram(command=parse_command(self.solver), name=self.title, settings=self.settings)
             return to_algorithm(program, self.title)
-        algorithm = load_object(str(self.solver), "algorithm") if self.is_user_code else self.solver
+        algorithm = load_object(str(self.solver), "algorithm", files) if self.is_user_code else self.solver
         if isinstance(algorithm, str):
             return make_algorithm(algorithm, **self.settings)
         return to_algorithm(algorithm, self.title, self.settings)
@@ -270,43 +234,92 @@ class Task:
         return make_solver(name, **{**respected, **settings})
 
 
-def check_task(task: Task) -> None:
+def make_inputs(runs: Iterable[Run]) -> list[Inputs]:
+    """Return the inputs of runs; each problem and each file is read once. InputError for settings that are not plain."""
+    problems: dict[int, tuple[GaitProblem, dict[str, Any]]] = {}
+    solvers: dict[tuple[int, int], tuple[Any, str]] = {}
+    listed = []
+    for run in runs:
+        if id(run.problem) not in problems:
+            problem = run.problem.load()
+            problems[id(run.problem)] = problem, identify_problem(problem)
+        if (key := (id(run.solver), id(run.settings))) not in solvers:
+            files = run.read_code()
+            solvers[key] = _describe_solver(run), "" if files is None else files.digest
+        listed.append(_make_inputs(run, *problems[id(run.problem)], *solvers[key]))
+    return listed
+
+
+def _make_inputs(run: Run, problem: GaitProblem, identity: dict[str, Any], solver: Any, code: str) -> Inputs:
+    limits = run.stop.limits
+    if not run.is_search and "evaluations" not in list_settings(str(run.solver)):  # it ends by itself, or by the clock
+        limits = {key: value for key, value in limits.items() if key == "time_limit_s"}
+    return Inputs(
+        problem=identity,
+        objective=problem.objective,
+        solver=solver["solver"],
+        settings=solver["settings"],
+        seed=run.run_seed,
+        version=__version__,
+        code=code,
+        handling=run.handling if run.is_search else None,
+        stop=limits,
+        polish=run.polish,
+        start=dict(run.start),
+    )
+
+
+def _describe_solver(run: Run) -> dict[str, Any]:
+    solver = (
+        run.solver if isinstance(run.solver, str) else {**describe_settings(run.solver), **_hash_source(run.solver)}
+    )
+    try:
+        plain: dict[str, Any] = json.loads(
+            json.dumps({"solver": solver, "settings": dict(run.settings)}, allow_nan=False)
+        )
+    except (TypeError, ValueError) as error:
+        raise InputError(f"settings of {run.title!r} must be numbers, texts and lists: {error}") from error
+    return plain
+
+
+def check_run(run: Run) -> None:
     """Raise now what would fail later: unknown problem, option, parameter, solver or setting; a bad label or limit."""
-    problem = task.problem.load()
-    for title in (task.problem.title, task.title):
+    problem = run.problem.load()
+    for title in (run.problem.title, run.title):
         if not LABEL.fullmatch(title):
             raise InputError(
                 f"a label has 1 to 64 letters, digits, spaces and . _ + : ( ) -, and begins with a letter or digit; got {title!r}"
             )
-    if task.is_user_code:
-        check_reference(str(task.solver), "algorithm")  # without running it
-    elif isinstance(task.solver, str) and task.solver not in list_solvers():
-        raise unknown("algorithm", task.solver, [*list_solvers(), *find_entry_points("algorithm")])
-    if task.stop.time_limit_s is not None and not task.stop.time_limit_s > 0.0:
-        raise InputError(f"time_limit_s must be > 0, got {task.stop.time_limit_s}")
-    if task.polish or not task.is_search:
-        task.make_solver().check(problem)
-    if task.is_search:
-        make_handling(task.handling.name, **task.handling.settings)
-        search = UNREAD if task.is_user_code else task.make_search()
-        check_budget(search, task.stop.evaluations)
-        task.stop.end_early(1.0)
-    if task.start:
-        if task.is_search:
-            raise InputError(f"search {task.title!r} takes no start point; only NLP solvers do")
-        problem.check_within(task.start)
+    if run.is_user_code:
+        check_reference(str(run.solver), "algorithm")  # without running it
+    elif isinstance(run.solver, str) and run.solver not in list_solvers():
+        raise unknown("algorithm", run.solver, [*list_solvers(), *find_entry_points("algorithm")])
+    if run.stop.time_limit_s is not None and not run.stop.time_limit_s > 0.0:
+        raise InputError(f"time_limit_s must be > 0, got {run.stop.time_limit_s}")
+    if run.polish or not run.is_search:
+        run.make_solver().check(problem)
+    if run.is_search:
+        make_handling(run.handling.name, **run.handling.settings)
+        search = UNREAD if run.is_user_code else run.make_search()
+        check_budget(search, run.stop.evaluations)
+        run.stop.end_early(1.0)
+    if run.start:
+        if run.is_search:
+            raise InputError(f"search {run.title!r} takes no start point; only NLP solvers do")
+        problem.check_within(run.start)
 
 
-def hash_solver_source(solver: object) -> str | None:
-    """Return the hash of a user-defined solver's source file; None without a file, as in a notebook, or if it is ours."""
-    kind = solver if inspect.isroutine(solver) else type(solver)
-    if kind.__module__.partition(".")[0] == "metaheuristics":
-        return None
-    try:
-        path = inspect.getsourcefile(kind)
-    except (TypeError, OSError):
-        return None
-    return hash_file(Path(path)) if path is not None and Path(path).is_file() else None
+def check_repeatable(problem: ProblemSpec) -> None:
+    """Raise InputError for a user's problem that is another one when it is loaded again, as one with random numbers is."""
+    if not isinstance(problem.name, str) or problem.name in PROBLEMS:
+        return
+    first = hash_formulas(problem.load())
+    forget_code(problem.name)
+    again = load(problem.name, **problem.options).with_values(**problem.values)
+    if hash_formulas(again) != first:
+        raise InputError(
+            f"two loads of the problem {problem.name!r} differ: fix the seed of its random numbers, or write the numbers down"
+        )
 
 
 def describe_problem(problem: GaitProblem) -> dict[str, Any]:
@@ -324,6 +337,18 @@ def describe_settings(settings: Any) -> dict[str, Any]:
     plain = is_dataclass(settings) and not isinstance(settings, type)
     values = asdict(settings) if plain else {k: v for k, v in getattr(settings, "__dict__", {}).items() if k[0] != "_"}
     return {"kind": kind, **{name: _encode_setting(value) for name, value in values.items()}}
+
+
+def _hash_source(solver: object) -> dict[str, str]:
+    """Return the hash of the file of a user-defined object; empty without a file, as in a notebook, or if it is ours."""
+    kind = solver if inspect.isroutine(solver) else type(solver)
+    if kind.__module__.partition(".")[0] in ("metaheuristics", "nlp_gait"):
+        return {}
+    try:
+        path = inspect.getsourcefile(kind)
+        return {"file_sha256": hash_json(Path(path).read_text(encoding="utf-8"))} if path else {}
+    except (TypeError, OSError):
+        return {}
 
 
 def _encode_setting(value: Any) -> Any:

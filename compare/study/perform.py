@@ -1,0 +1,329 @@
+"""One run of a solver on a problem, from its inputs to its record.
+
+User code runs in a process of its own, which reports its best point while it searches: a run that is ended from outside keeps it.
+The judge evaluates the point in a process that user code cannot reach.
+"""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from compare.judge import evaluate
+from compare.study.record import (
+    History,
+    RunRecord,
+    Times,
+    check_readable,
+    describe_evaluation,
+    format_now,
+    list_versions,
+)
+from compare.study.run import IPOPT, Inputs, Run, describe_settings
+from metaheuristics.interface import FEASIBILITY
+from metaheuristics.minimize import minimize
+from metaheuristics.registry import make_handling
+from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.kernel.compiled import compile_objective
+from nlp_gait.backends.solve import make_solution
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array
+from nlp_gait.formulation.solution import Best
+from nlp_gait.processes import Job, keep_working_folder
+
+Send = Callable[[Any], None]
+Entry = tuple[int, float, float, float]
+"""Evaluations, violation and objective of the best point, which is minimised, and seconds."""
+
+MOST_REASON = 500  # characters of an error in a record
+MOST_HISTORY = 10_000  # entries of a history in a record, some 60 bytes each
+# A run that respects its budget and its time limit ends within them; its process is killed this long after either.
+GRACE_S = 5.0
+REPORTED_EVERY_S = 0.2
+# Number of runs of one solver for which compiling is weighed. The same number in every study: compiled and interpreted functions
+# differ in the last bits, and no run may depend on how many others there are.
+PLANNED_RUNS = 20
+
+
+class ChangedFileError(InputError):
+    """A file of the user has changed while the study runs."""
+
+
+@dataclass(kw_only=True)
+class SearchEnd:
+    """What a search has found when it ends, or so far."""
+
+    x: Array  #: (n,) best point; empty before the first evaluation
+    entries: list[Entry] = field(default_factory=list)  #: history, the last one is the end
+    failed: int = 0  #: evaluations
+    generations: int = 0
+    status: str = ""
+    settings: dict[str, Any] = field(default_factory=dict)
+    time_s: Times = Times()
+
+
+class Reporter:
+    """Callback of ``minimize`` that sends the best point so far."""
+
+    def __init__(self, send: Send, budget: int) -> None:
+        self._send, self._budget, self._started, self._sent = send, budget, time.perf_counter(), 0.0
+        self._count, self._failed, self._best = 0, 0, (math.inf, math.inf)
+
+    def __call__(self, X: Array, f: Array, violation: Array) -> None:
+        """Count a generation, and report a better point, or the count now and then."""
+        self._count += len(X)
+        self._failed += int(np.count_nonzero(np.isinf(f)))
+        leader = FEASIBILITY.best(f, violation)
+        best, seconds = (float(violation[leader]), float(f[leader])), time.perf_counter() - self._started
+        is_better = best < self._best or not self._sent
+        self._best = min(best, self._best)
+        if is_better or seconds > self._sent + REPORTED_EVERY_S or self._count >= self._budget:
+            self._sent = max(seconds, 1e-9)
+            self._send(((self._count, *self._best, seconds), self._failed, X[leader].copy() if is_better else None))
+
+
+@dataclass(kw_only=True)
+class IsolatedRun:
+    """A run of user code in its own process, as seen from outside."""
+
+    run: Run
+    inputs: Inputs
+    latest: SearchEnd = field(default_factory=lambda: SearchEnd(x=np.empty(0)))
+    deadline: float | None = None  #: of time.monotonic; None before the process begins
+
+    def make_job(self) -> Job:
+        """Return the job."""
+        call = partial(_search_reported, self.run, self.inputs)
+        return Job(call=call, receive=self.receive, is_late=self.is_late, alone=True)
+
+    def receive(self, message: Any) -> None:
+        """Keep the best point so far; a run that has used its budget has to end soon."""
+        entry, failed, x = message
+        entries, self.latest.failed = self.latest.entries, failed
+        if not entries:  # the clock starts with the search
+            self.deadline = time.monotonic() - entry[3] + self._allowed_s
+        if len(entries) > 1 and entries[-2][1:3] == entries[-1][1:3]:
+            entries.pop()  # a count without a better point
+        entries.append(entry)
+        if x is not None:
+            self.latest.x = x
+        if entry[0] >= self.run.stop.evaluations:
+            self.deadline = min(self.deadline or math.inf, time.monotonic() + GRACE_S)
+
+    @property
+    def _allowed_s(self) -> float:
+        limit = self.run.stop.time_limit_s
+        return math.inf if limit is None else limit + GRACE_S
+
+    def is_late(self) -> bool:
+        """Return whether the process has to be ended."""
+        if self.deadline is None:
+            self.deadline = time.monotonic() + self._allowed_s
+        return time.monotonic() > self.deadline
+
+    def conclude(self, result: Any) -> RunRecord:
+        """Return the record of what the process returned, or of its error."""
+        if isinstance(result, ChangedFileError):
+            raise result
+        end = result
+        if isinstance(result, TimeoutError) and self.latest.entries:
+            used = self.latest.entries[-1][0] >= self.run.stop.evaluations
+            why = "evaluation budget used" if used else "time limit reached"
+            last = self.latest.entries[-1]
+            end = replace(
+                self.latest,
+                status=f"{why}; the search did not return and was ended",
+                settings={"kind": "user code"},
+                time_s=Times(build=0.0, compile=0.0, solve=last[3], objective=math.nan),
+            )
+        if not isinstance(end, SearchEnd):
+            limit = self.run.stop.time_limit_s
+            reason = f"it evaluated nothing within its time limit of {limit} s"
+            if not isinstance(result, TimeoutError):
+                reason = result if isinstance(result, str) else describe_error(result)
+            return make_failed(self.run, self.inputs, reason)
+        return catch_errors(self.run, self.inputs, lambda: judge_search(self.run, self.inputs, end))
+
+
+def perform(run: Run, inputs: Inputs, search: RunRecord | None, _: Send) -> RunRecord:
+    """Perform a run of a solver of this package; whatever fails in it becomes its record.
+
+    ``search`` is the record of the search that IPOPT continues, if it was run before.
+    """
+    if not run.is_search or (run.polish and search is not None):
+        return catch_errors(run, inputs, lambda: run_solver(run, inputs, search))
+    return catch_errors(run, inputs, lambda: judge_search(run, inputs, run_search(run, inputs)))
+
+
+def catch_errors(run: Run, inputs: Inputs, call: Callable[[], RunRecord]) -> RunRecord:
+    """Return the record that a call makes, or that of a failed run."""
+    try:
+        record = call()
+        check_readable(record)
+        return record
+    except (KeyboardInterrupt, ChangedFileError):
+        raise
+    except BaseException as error:  # user code may raise anything
+        return make_failed(run, inputs, describe_error(error))
+
+
+def describe_error(error: BaseException) -> str:
+    """Return the class and the text of an error in one line of valid UTF-8."""
+    try:
+        text = " ".join(str(error).split())[:MOST_REASON]
+    except Exception:
+        text = "its text cannot be read"
+    name = type(error).__name__
+    return (f"{name}: {text}" if text else name).encode("utf-8", "backslashreplace").decode()
+
+
+def make_record(run: Run, inputs: Inputs, time_s: Times, **results: Any) -> RunRecord:
+    """Return the record of a run that ends now: ``results`` are the fields from ``status`` on."""
+    return RunRecord(
+        problem=run.problem.title,
+        solver=run.title,
+        run=run.number,
+        inputs=inputs,
+        time_s=replace(time_s, finished=format_now()),
+        versions=list_versions(),
+        **results,
+    )
+
+
+def make_failed(run: Run, inputs: Inputs, reason: str) -> RunRecord:
+    """Return the record of a run without a result."""
+    times = Times(build=0.0, compile=0.0, solve=0.0, objective=0.0)
+    return make_record(run, inputs, times, status=f"failed: {reason}", counts={"f": 0})
+
+
+def _search_reported(run: Run, inputs: Inputs, send: Send) -> SearchEnd | str:
+    """Return the end of a search, or its error as text: the class of a user's error exists in this process only."""
+    try:
+        return run_search(run, inputs, Reporter(send, run.stop.evaluations))
+    except ChangedFileError:
+        raise
+    except BaseException as error:
+        return describe_error(error)
+
+
+def run_search(run: Run, inputs: Inputs, callback: Reporter | None = None) -> SearchEnd:
+    """Run a search; raises ChangedFileError if a file is not the one whose hash is in the inputs."""
+    started = time.perf_counter()
+    files, problem = run.read_code(), run.problem.load()
+    if (files is not None and files.digest != inputs.code) or identify_problem(problem) != inputs.problem:
+        raise ChangedFileError("a file of the problem or of a solver has changed since the study began")
+    built = time.perf_counter()
+    objective = compile_objective(problem, threads=1)  # runs take the processors
+    compiled = time.perf_counter()
+    stop = run.stop
+    with keep_working_folder():  # as wrappers of external programs change it
+        result = minimize(
+            objective,
+            run.make_search(files),
+            evaluations=stop.evaluations,
+            seed=run.run_seed,
+            handling=make_handling(run.handling.name, **run.handling.settings),
+            stop=stop.end_early(problem.objective.sign),
+            callback=callback,
+        )
+    history, settings = result.history, describe_settings(result.algorithm)
+    settings.pop("command", None)  # of a program: the inputs have it, and it names files
+    columns = (history.evaluations, history.violation, history.objective, history.elapsed_s)
+    return SearchEnd(
+        x=np.array(result.x),
+        entries=[(int(n), float(v), float(f), float(t)) for n, v, f, t in zip(*columns, strict=True)],
+        failed=result.failed_evaluations,
+        generations=result.generations,
+        status="; ".join(result.reasons),
+        settings={**settings, "handling": describe_settings(result.handling)},
+        time_s=Times(
+            build=built - started, compile=compiled - built, solve=result.time_s, objective=result.objective_time_s
+        ),
+    )
+
+
+def judge_search(run: Run, inputs: Inputs, end: SearchEnd) -> RunRecord:
+    """Return the record of a search, whose best point is judged."""
+    problem = run.problem.load()
+    sign, (evaluations, violation, objective, _) = problem.objective.sign, end.entries[-1]
+    best = [sign * f if v == 0.0 and math.isfinite(f) else None for _, v, f, _ in end.entries]
+    kept = choose_entries(best)
+    return make_record(
+        run,
+        inputs,
+        replace(end.time_s, history=tuple(end.entries[k][3] for k in kept)),
+        status=end.status,
+        settings=end.settings,
+        reported_feasible=violation == 0.0,
+        reported_objective=sign * objective if math.isfinite(objective) else None,
+        x=problem.by_name(end.x),
+        **describe_evaluation(evaluate(problem, end.x, prove=False)),
+        counts={"f": evaluations},
+        failed_evaluations=end.failed,
+        iterations=end.generations,
+        history=History(evaluations=tuple(end.entries[k][0] for k in kept), objective=tuple(best[k] for k in kept)),
+    )
+
+
+def choose_entries(best: Sequence[float | None]) -> list[int]:
+    """Return which entries of a history to keep: all, or of a long one the changes, evenly thinned, and the last entry."""
+    if len(best) <= MOST_HISTORY:
+        return list(range(len(best)))
+    changes = [k for k in range(len(best)) if k == 0 or best[k] != best[k - 1]]
+    return sorted({*changes[:: math.ceil(len(changes) / MOST_HISTORY)], len(best) - 1})
+
+
+def run_solver(run: Run, inputs: Inputs, search: RunRecord | None = None) -> RunRecord:
+    """Run an NLP solver: from the given start, from the end of a search that it continues, or from a random point."""
+    started = time.perf_counter()
+    problem, solver = run.problem.load(), run.make_solver()
+    if search is not None and not search.x:
+        raise InputError(f"the search has no point to polish: {search.status}")
+    start = run.start if search is None else search.x
+    x0 = problem.check_within(start) if start else problem.start_point(np.random.default_rng(run.run_seed))
+    outcome = solver.prepare(problem, PLANNED_RUNS).run(problem, x0)
+    prepared_s = time.perf_counter() - started - outcome.time_s
+    compile_s = min(outcome.compile_s, prepared_s)  # less where the process had the solver already
+    settings = solver.to_dict()
+    if outcome.linear_solver:
+        settings["linear_solver"] = outcome.linear_solver
+    solution = make_solution(problem, [outcome])
+    counts, history, calls, seconds = outcome.evaluations.by_kind(), list[Best](), 0, 0.0
+    if search is not None:
+        calls, seconds = search.counts["f"], search.time_s.solve
+        counts["f"] += calls
+        history += map(Best, search.history.evaluations, search.history.objective, search.time_s.history)
+        settings = {**search.settings, IPOPT: settings}
+    # A solver that keeps no history has its end.
+    end = Best(outcome.evaluations.f, outcome.objective if outcome.claimed else None, outcome.time_s)
+    history += (Best(calls + b.calls, b.objective, seconds + b.time_s) for b in outcome.history or (end,))
+    history = [history[k] for k in choose_entries([best.objective for best in history])]
+    judged = describe_evaluation(evaluate(problem, outcome.x, prove=False))
+    return make_record(
+        run,
+        inputs,
+        Times(
+            build=prepared_s - compile_s,
+            compile=compile_s,
+            solve=seconds + outcome.time_s,
+            objective=outcome.objective_s,
+            history=tuple(best.time_s for best in history),
+        ),
+        settings=settings,
+        status=solution.status if solver.name == IPOPT else outcome.status,  # other solvers are quoted
+        reported_feasible=outcome.claimed,
+        x=problem.by_name(outcome.x),
+        reported_objective=judged["objective"] if math.isfinite(judged["objective"]) else None,
+        **judged,
+        counts=counts,
+        failed_evaluations=0 if search is None else search.failed_evaluations,
+        iterations=outcome.iterations,
+        active_constraints=solution.active_constraints,
+        history=History(
+            evaluations=tuple(best.calls for best in history), objective=tuple(best.objective for best in history)
+        ),
+    )

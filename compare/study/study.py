@@ -1,0 +1,367 @@
+"""A study: solvers x problems x runs, one record for each finished run, in a folder.
+
+``records/<problem>/<solver>-<run>-<key>.json`` is the record of a run; the key is the hash of its inputs, so runs with different
+settings never overwrite each other, and a run with the same inputs is read instead of repeated. ``study.json`` has the settings
+and lists the runs that belong to the study; other records stay and are not read.
+"""
+
+import logging
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+from compare.study.perform import (
+    MOST_REASON,
+    PLANNED_RUNS,
+    ChangedFileError,
+    IsolatedRun,
+    describe_error,
+    make_failed,
+    perform,
+)
+from compare.study.record import RunRecord, check_readable, format_now, read_record
+from compare.study.run import Inputs, ProblemSpec, Run, check_repeatable, check_run, make_inputs
+from compare.study.settings import StudySettings, parse_settings
+from nlp_gait.backends.kernel.compiled import compile_objective
+from nlp_gait.decoding import decode
+from nlp_gait.errors import GaitError, InputError, OutputError, WorkerError
+from nlp_gait.files import convert_errors, lock_folder, make_writable_folder, read_json, remove_leftovers, write_json
+from nlp_gait.interrupts import Interrupted, count_interrupts, delay_interrupts
+from nlp_gait.processes import Job, has_fork, run_jobs
+
+FILE, RECORDS = "study.json", "records"
+CONNECT_TIMEOUT = "10s"  # to a Dask scheduler
+REMEDY = "delete it; the records stay valid"
+Item = tuple[Run, Inputs, RunRecord | None]
+"""A run, its inputs, and the record of the search that it polishes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyFile:
+    """Content of ``study.json``."""
+
+    schema: Literal[3] = 3
+    command: str = ""  #: that ran last
+    date: str = ""  #: of it, UTC
+    study: Mapping[str, Any] | None = None  #: its settings; None without one
+    runs: tuple[str, ...] = ()  #: that belong to the study: names of their records without suffix
+
+    def read_settings(self, source: str) -> StudySettings | None:
+        """Return the settings; raises InputError, with the source in front, if they are damaged."""
+        return None if self.study is None else parse_settings(self.study, source, runs_code=False)
+
+
+def read_study_file(folder: Path) -> StudyFile:
+    """Return the content of ``study.json``, empty without one; raises InputError if it is damaged or of another schema."""
+    path = folder / FILE
+    if not os.path.lexists(path):
+        return StudyFile()
+    raw = read_json(path, "study", remedy=REMEDY)
+    with convert_errors(f"study {str(path)!r} is damaged", InputError, REMEDY):
+        return decode(StudyFile, raw)
+
+
+def write_command(folder: Path, settings: StudySettings, command: str) -> None:
+    """Write the settings and the command of a study; raises InputError if its file is damaged, and OutputError."""
+    with lock_folder(folder):
+        file = replace(read_study_file(folder), study=settings.to_json(), command=command, date=format_now())
+        write_json(folder / FILE, asdict(file))
+
+
+def list_runs(folder: Path, names: Sequence[str]) -> None:
+    """Make runs part of a study; they replace the runs of their problems and solvers, whose records stay as files."""
+    with lock_folder(folder):
+        file = read_study_file(folder)
+        solvers = {_name_solver(name) for name in names}
+        kept = [name for name in file.runs if _name_solver(name) not in solvers]
+        if set(file.runs) != {*kept, *names}:
+            write_json(folder / FILE, asdict(replace(file, runs=(*kept, *dict.fromkeys(names)))))
+
+
+def _name_solver(name: str) -> str:
+    return name.rsplit("-", 2)[0]  # without run and key
+
+
+def name_run(problem: str, solver: str, number: int, inputs: Inputs) -> str:
+    """Return ``<problem>/<solver>-<run>-<key>``; a colon in a label becomes a full stop."""
+    return f"{name_group(problem, solver)}-{number:04d}-{inputs.key}"
+
+
+def name_group(problem: str, solver: str) -> str:
+    """Return ``<problem>/<solver>``, with which the names of all runs of a solver on a problem begin."""
+    return f"{problem}/{solver}".replace(":", ".")
+
+
+def name_record(record: RunRecord) -> str:
+    """Return the name of a record's file without suffix."""
+    return name_run(record.problem, record.solver, record.run, record.inputs)
+
+
+def write_record(record: RunRecord, folder: Path) -> Path:
+    """Write a record to a study's folder and return its file; raises OutputError."""
+    path = folder / RECORDS / f"{name_record(record)}.json"
+    make_writable_folder(path.parent)
+    write_json(path, record.to_json())
+    return path
+
+
+def write_records(records: Sequence[RunRecord], folder: Path) -> list[Path]:
+    """Write records to a study's folder, make them part of the study, and return their files; raises as ``list_runs``."""
+    paths = [write_record(record, make_writable_folder(folder)) for record in records]
+    list_runs(folder, [name_record(record) for record in records])
+    return paths
+
+
+def read_each(folder: Path) -> list[tuple[Path, RunRecord | InputError]]:
+    """Return files and records, damaged ones as their error; InputError if there are none.
+
+    Those that ``study.json`` lists are read, in its order; all by their names, if it lists none.
+    """
+    listed = {folder / RECORDS / f"{name}.json": place for place, name in enumerate(read_study_file(folder).runs)}
+    with convert_errors(f"folder {str(folder)!r} cannot be read", InputError):
+        paths = [path for path in sorted((folder / RECORDS).glob("*/*.json")) if path in listed or not listed]
+        paths.sort(key=lambda path: listed.get(path, 0))
+    if not paths:
+        raise InputError(f"{str(folder)!r} contains no records ({RECORDS}/<problem>/<solver>-<run>-<key>.json)")
+    records: list[tuple[Path, RunRecord | InputError]] = []
+    for path in paths:
+        try:
+            records.append((path, _read_named(path)))
+        except InputError as error:
+            records.append((path, error))
+    return records
+
+
+def read_records(folder: Path) -> tuple[list[RunRecord], list[str]]:
+    """Return the records of a study in the order of ``read_each``, and a sentence for each damaged one; raises as that."""
+    each = [record for _, record in read_each(folder)]
+    return [r for r in each if isinstance(r, RunRecord)], [str(r) for r in each if isinstance(r, InputError)]
+
+
+def _read_named(path: Path) -> RunRecord:
+    """Return the record; one under another name than that of its inputs is refused, because it could count twice."""
+    record = read_record(path)
+    name = name_record(record)
+    if path != path.parents[1] / f"{name}.json":
+        raise InputError(f"record {str(path)!r} belongs to {name}.json; rename or delete it")
+    return record
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Study:
+    """What to run."""
+
+    runs: tuple[Run, ...]  #: in any order
+    folder: Path | None = None  #: where records are written; None writes none
+    jobs: int = 1  #: worker processes; 1 runs all but user code by name in this process
+    scheduler: str | None = None  #: address of a Dask scheduler to use instead of local processes
+
+    def __post_init__(self) -> None:
+        """Validate the study."""
+        if self.jobs < 1:
+            raise InputError(f"jobs must be at least 1, got {self.jobs}")
+        if not self.runs:
+            raise InputError("a study needs at least one problem, one solver and one run")
+        specs: dict[str, ProblemSpec] = {}
+        for run in self.runs:
+            if specs.setdefault(run.problem.title, run.problem) != run.problem:
+                raise InputError(
+                    f"two problems of the study are called {run.problem.title!r}; give them different labels"
+                )
+        names = Counter((run.problem.title, run.title, run.number) for run in self.runs)
+        (problem, solver, _), count = names.most_common(1)[0]
+        if count > 1:
+            raise InputError(
+                f"two solvers of the study are called {solver!r} on {problem!r}; give them different labels"
+            )
+
+    def __repr__(self) -> str:
+        problems, solvers = dict.fromkeys(r.problem.title for r in self.runs), dict.fromkeys(r.title for r in self.runs)
+        place = "without a folder" if self.folder is None else f"in {str(self.folder)!r}"
+        return f"<Study of {', '.join(problems)} by {', '.join(solvers)}: {len(self.runs)} runs, {place}>"
+
+    def check(self) -> None:
+        """Raise now what would fail in every run of a solver, see ``check_run``."""
+        by_number = sorted(self.runs, key=lambda run: run.number)  # the last one has the largest seed
+        for run in {(r.problem.title, r.title): r for r in by_number}.values():
+            check_run(run)
+        for problem in {run.problem.title: run.problem for run in self.runs}.values():
+            check_repeatable(problem)
+
+    def name_run(self, run: Run, inputs: Inputs) -> str:
+        """Return the name of a run's record without suffix."""
+        return name_run(run.problem.title, run.title, run.number, inputs)
+
+
+def run_study(
+    study: Study,
+    progress: Callable[[RunRecord], None] = lambda record: None,
+    on_stored: Callable[[int], None] = lambda count: None,
+) -> list[RunRecord]:
+    """Run all runs without a record and return the records of all runs, in their order.
+
+    A record belongs to a run if their inputs are equal. Each record is written as soon as its run has ended, so an interruption
+    loses only the runs in progress. The study in the folder then consists of these runs, and of those of other solvers.
+
+    Args:
+        study: what to run.
+        progress: called with the record of each run that has ended.
+        on_stored: called once with the number of runs that have a record.
+
+    Raises:
+        UnknownNameError, InputError: see ``check_run``; InputError also for a damaged record, or if a file changes meanwhile.
+        OutputError: the folder is not writable (checked before the first run).
+        WorkerError: no process can begin, or the cluster is lost.
+        Interrupted: Ctrl-C; contains the records of the finished runs.
+    """
+    study.check()
+    inputs = make_inputs(study.runs)
+    for run, given in {
+        (r.problem.title, r.title): (r, given) for r, given in zip(study.runs, inputs, strict=True)
+    }.values():
+        with convert_errors(f"{run.title} on {run.problem.title}: its records could not be read", InputError):
+            check_readable(make_failed(run, given, "not run"))
+    records = _read_finished(study, inputs)
+    on_stored(len(records))
+    remedy = "rerun the same command to continue"
+    try:
+        for index, record in _run_missing(study, inputs, records):
+            with delay_interrupts():
+                if study.folder is not None:
+                    write_record(record, study.folder)
+                records[index] = record
+            progress(record)
+    except KeyboardInterrupt:
+        finished = [records[index] for index in sorted(records)]
+        raise Interrupted(f"interrupted after {len(finished)} of {len(study.runs)} runs", finished) from None
+    except OutputError as error:
+        raise OutputError(f"{error}; the {len(records)} runs before it are stored: fix this and {remedy}") from error
+    except ChangedFileError as error:
+        raise InputError(f"{error}; the {len(records)} runs before it are stored: {remedy}") from error
+    return [records[index] for index in range(len(study.runs))]
+
+
+def _read_finished(study: Study, inputs: Sequence[Inputs]) -> dict[int, RunRecord]:
+    """Return the records by index of the run; list the runs."""
+    if study.folder is None:
+        return {}
+    names = [study.name_run(run, given) for run, given in zip(study.runs, inputs, strict=True)]
+    paths = [study.folder / RECORDS / f"{name}.json" for name in names]
+    for folder in {path.parent for path in paths}:
+        remove_leftovers(make_writable_folder(folder))
+    list_runs(study.folder, names)
+    return {index: _read_named(path) for index, path in enumerate(paths) if path.exists()}
+
+
+def _run_missing(
+    study: Study, inputs: Sequence[Inputs], records: Mapping[int, RunRecord]
+) -> Iterator[tuple[int, RunRecord]]:
+    """Run what has no record, what polishes a search last; yield the indices and records as runs finish."""
+    waiting = [index for index in range(len(study.runs)) if index not in records]
+    if study.scheduler is None:
+        _prepare([study.runs[index] for index in waiting])
+    # Long runs first, to balance the load; and runs of all problems in turn.
+    waiting.sort(key=lambda index: (study.runs[index].is_search, study.runs[index].number))
+    plain, polished = ([k for k in waiting if study.runs[k].polish == polish] for polish in (False, True))
+    for position, record in _run_items([(study.runs[k], inputs[k], None) for k in plain], study):
+        yield plain[position], record
+    searches = {record.inputs.key: record for record in records.values()}
+    before = {k: replace(inputs[k], polish=False) for k in polished}
+    alone = [k for k in polished if before[k].key not in searches]  # without their search in the study
+    items: list[Item] = [(replace(study.runs[k], polish=False), before[k], None) for k in alone]
+    searches.update((before[alone[position]].key, record) for position, record in _run_items(items, study))
+    items = [(study.runs[k], inputs[k], searches[before[k].key]) for k in polished]
+    for position, record in _run_items(items, study):
+        yield polished[position], record
+
+
+def _prepare(runs: Sequence[Run]) -> None:
+    """Compile once what pays for many runs: forks have it, other processes find it in the cache folder."""
+    for run in {(r.problem.title, r.title): r for r in reversed(runs) if r.polish or not r.is_search}.values():
+        with suppress(GaitError):  # the records of the runs report it
+            run.make_solver().prepare(run.problem.load(), PLANNED_RUNS)
+    if any(run.is_user_code for run in runs):
+        import scipy.linalg  # noqa: F401  which every process of a user's search would import
+
+    for problem in {run.problem.title: run.problem for run in runs if run.is_search}.values():
+        with suppress(GaitError):
+            compile_objective(problem.load(), threads=1)
+
+
+def _run_items(items: Sequence[Item], study: Study) -> Iterator[tuple[int, RunRecord]]:
+    """Run items in any order, and yield the position and the record of each as it finishes."""
+    if study.scheduler is not None:
+        yield from _run_on_cluster(items, study.scheduler)
+        return
+    jobs, isolated, places = list[Job](), dict[int, IsolatedRun](), list[int]()
+    for position, (run, inputs, search) in enumerate(items):
+        is_isolated = run.is_user_code and not run.polish and has_fork()
+        movable = has_fork() or isinstance(run.problem.name, str)
+        if not is_isolated and (study.jobs == 1 or not movable):
+            with count_interrupts() as presses:
+                record = perform(run, inputs, search, print)
+                if presses:  # user code has swallowed it
+                    raise KeyboardInterrupt
+            yield position, record
+            continue
+        if is_isolated:
+            isolated[len(jobs)] = IsolatedRun(run=run, inputs=inputs)
+        jobs.append(isolated[len(jobs)].make_job() if is_isolated else Job(call=partial(perform, run, inputs, search)))
+        places.append(position)
+    for number, result in run_jobs(jobs, study.jobs):
+        run, inputs, _ = items[places[number]]
+        if isinstance(result, ChangedFileError):
+            raise result
+        if number in isolated:
+            result = isolated[number].conclude(result)
+        elif isinstance(result, BaseException):
+            result = make_failed(run, inputs, describe_error(result))
+        yield places[number], result
+
+
+def _run_on_cluster(items: Sequence[Item], scheduler: str) -> Iterator[tuple[int, RunRecord]]:
+    """Run items on the workers of a Dask scheduler, which repeats the runs of a worker that dies.
+
+    Files of user code and robots must have the same paths for the workers; relative ones start in the working folder of this
+    process.
+
+    Raises:
+        InputError: no scheduler answers at the address, or Dask is not installed.
+        WorkerError: the scheduler is lost, or its workers cannot perform the runs.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError as error:
+        raise InputError("--scheduler needs Dask: pip install 'nlp-gait[cluster]'") from error
+
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are reported in one sentence
+    with convert_errors(f"no Dask scheduler answers at {scheduler!r}", InputError, "start one with `dask scheduler`"):
+        client = Client(scheduler, timeout=CONNECT_TIMEOUT)
+    with client:
+        try:
+            futures = {client.submit(_perform_there, os.getcwd(), *item, pure=False): k for k, item in enumerate(items)}
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except Exception as error:  # of Dask, or of the worker's own Python, which may lack a package
+            reason = " ".join(str(error).split())[:MOST_REASON]
+            raise WorkerError(
+                f"the Dask cluster at {scheduler!r} failed: {reason}; finished runs are stored: rerun the same command to "
+                "continue. Its workers need the same nlp-gait and extras as this machine"
+            ) from error
+
+
+def _perform_there(folder: str, run: Run, inputs: Inputs, search: RunRecord | None) -> RunRecord:
+    if os.path.isdir(folder):
+        os.chdir(folder)
+    (there,) = make_inputs([run])
+    if there.key != inputs.key:
+        raise WorkerError(
+            "a worker has another version of nlp-gait or of your files than this machine; install the same"
+        )
+    return perform(run, inputs, search, print)

@@ -1,0 +1,196 @@
+"""Verification finds honest mistakes by computing again, and packed code runs only if it is allowed to."""
+
+import json
+import os
+import shutil
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from compare.study.pack import INDEX, pack_study, unpack_archive
+from compare.study.run import ProblemSpec, Stop
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.study import Study, read_records, run_study, write_command
+from compare.study.verify import Verification, compute_chance, verify_study
+from nlp_gait.errors import InputError
+from tests.robots.custom import humanoid
+
+WALK = ProblemSpec(name="walk12")
+
+
+def make_study(folder: Path, solvers: tuple[SolverSpec, ...], problem: ProblemSpec = WALK, runs: int = 3) -> Path:
+    settings = StudySettings(problems=(problem,), solvers=solvers, runs=runs, starts=1, stop=Stop(evaluations=100))
+    folder.mkdir(exist_ok=True)
+    write_command(folder, settings, "nlp-gait compare")
+    run_study(Study(runs=settings.make_runs(), folder=folder, jobs=2))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    solvers = (SolverSpec(name="pso", polish=True), SolverSpec(name="ga"), SolverSpec(name="ipopt"))
+    return make_study(tmp_path_factory.mktemp("sound") / "study", solvers)
+
+
+def find(folder: Path, solver: str, run: int = 0) -> Path:
+    (path,) = folder.glob(f"records/walk12/{solver}-{run:04d}-*.json")
+    return path
+
+
+def edit(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    data = json.loads(path.read_text())
+    change(data)
+    path.write_text(json.dumps(data))
+
+
+def describe(verification: Verification) -> str:
+    return "\n".join(" ".join(row) for row in verification.rows)
+
+
+def test_an_honest_study_holds_and_all_of_its_runs_are_repeated(sound: Path) -> None:
+    verification = verify_study(sound)
+    assert verification.holds and not verification.rows
+    assert verification.sentence == "10 points evaluated and 10 of 10 runs repeated: nothing differs"
+
+
+def test_a_share_says_how_likely_altered_runs_would_pass(sound: Path) -> None:
+    verification = verify_study(sound, share=0.2)
+    assert verification.repeated == 2 and "would pass with probability 0.8" in verification.sentence
+    assert compute_chance(106, 21) == pytest.approx(0.0982, abs=1e-4)  # 85/106 * 84/105 * ...: none of 10 is among 21
+
+
+ALTERATIONS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "objective": (lambda r: r.update(objective=0.99), "its objective is 0.99, but that of its x is"),
+    "metric": (lambda r: r["metrics"].update({next(iter(r["metrics"])): 7.0}), "is 7, but that of its x is"),
+    "point": (lambda r: r["x"].update({next(iter(r["x"])): 0.1}), "but that of its x is"),
+    "history": (lambda r: r["history"]["objective"].__setitem__(-1, 0.9), "history: recorded"),
+    "count": (lambda r: r["counts"].update(f=99), "counts: recorded"),
+    "status": (lambda r: r.update(status="converged"), "status: recorded '\"converged\"'"),
+    "infeasible": (lambda r: r.update(feasible=False), "it is called infeasible"),
+    "version": (lambda r: r["versions"].update(casadi="3.0.0"), "computed by version 3.0.0"),
+}
+
+
+@pytest.mark.parametrize("what", ALTERATIONS)
+def test_an_edited_record_is_named(what: str, sound: Path, tmp_path: Path) -> None:
+    change, message = ALTERATIONS[what]
+    folder = shutil.copytree(sound, tmp_path / "study")
+    edit(find(folder, "ga"), change)
+    verification = verify_study(folder)
+    assert message in describe(verification) and verification.holds == (what == "version")
+
+
+def test_copied_points_missing_runs_and_damaged_records_are_named(sound: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(sound, tmp_path / "study")
+    best = json.loads(find(folder, "ga").read_text())
+    judged = ("x", "objective", "violation", "metrics", "reported_objective", "history", "time_s")
+    edit(find(folder, "pso"), lambda record: record.update({name: best[name] for name in judged}))
+    find(folder, "ga", 1).unlink()
+    find(folder, "ga", 2).write_text("{")
+    text = describe(verify_study(folder))
+    assert "walk12, pso, run 0 differs" in text and "is not valid JSON" in text
+    assert "walk12, ga, run 1 and 1 more missing" in text
+
+
+PROGRAM = """
+import json, random, sys
+def main():
+    head = json.loads(sys.stdin.readline())
+    draw = random.Random(head["seed"])
+    while True:
+        x = [draw.uniform(low, high) for low, high in zip(head["lower"], head["upper"])]
+        print(json.dumps({"x": [x]}), flush=True)
+        if json.loads(sys.stdin.readline()).get("stop"):
+            return
+main()
+"""
+
+
+def test_an_archive_with_a_program_and_code_is_verified_in_another_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home, elsewhere = tmp_path / "home", tmp_path / "elsewhere"
+    for folder in (home, elsewhere):
+        folder.mkdir()
+    monkeypatch.chdir(home)
+    mark = tmp_path / "it-ran"
+    Path("es.py").write_text(PROGRAM)
+    Path("helper.py").write_text("SHARE = 0.5\n")
+    Path("mine.py").write_text(
+        "import pathlib, helper\ndef search(f, lower, upper, evaluations, seed):\n"
+        f" pathlib.Path({str(mark)!r}).touch()\n f(lower + helper.SHARE * (upper - lower))\n"
+    )
+    program = f"cmd:{sys.executable} es.py"
+    study = make_study(home / "study", (SolverSpec(name=program), SolverSpec(name="mine.py:search")), runs=2)
+    records, _ = read_records(study)
+    archive = pack_study(study, records, tmp_path / "study.zip")
+    monkeypatch.chdir(elsewhere)
+    for name in ("es.py", "mine.py", "helper.py"):
+        (home / name).unlink()
+    mark.unlink()
+    unpack_archive(archive, elsewhere / "unpacked")
+    text = describe(verify_study(elsewhere / "unpacked"))
+    assert text.count("is packed, and runs only with --run-code") == 2 and not mark.exists()
+    verification = verify_study(elsewhere / "unpacked", run_code=True)
+    assert verification.sentence == "4 points evaluated and 4 of 4 runs repeated: nothing differs" and mark.exists()
+    index = json.loads((elsewhere / "unpacked" / INDEX).read_text())
+    for place in index.values():
+        (elsewhere / "unpacked" / place).write_text("print('another')\n")
+    assert "is not that of the record" in describe(verify_study(elsewhere / "unpacked", run_code=True))
+
+
+@pytest.mark.slow
+def test_a_packed_robot_stands_for_the_authors_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = tmp_path / "robots" / "my.json"
+    robot.parent.mkdir()
+    robot.write_text(json.dumps(humanoid()))
+    spec = ProblemSpec(name="nao-ssp", options={"robot": str(robot)})
+    study = make_study(tmp_path / "study", (SolverSpec(name="random"),), spec, runs=1)
+    archive = pack_study(study, read_records(study)[0], tmp_path / "study.zip")
+    robot.unlink()
+    unpack_archive(archive, tmp_path / "unpacked")
+    assert (
+        verify_study(tmp_path / "unpacked").sentence == "1 points evaluated and 1 of 1 runs repeated: nothing differs"
+    )
+
+
+def bomb(path: Path) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("study.json", b"0" * 2**24)
+
+
+def leave(path: Path) -> None:
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("../study.json", "{}")
+
+
+def link(path: Path) -> None:
+    entry = zipfile.ZipInfo("study.json")
+    entry.external_attr = 0o120777 << 16
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr(entry, "/etc/passwd")
+
+
+def nest(path: Path) -> None:
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("/".join("d" * 70) + "/x", "")
+
+
+def crowd(path: Path) -> None:
+    with zipfile.ZipFile(path, "w") as archive:
+        for number in range(10_001):
+            archive.writestr(str(number), "")
+
+
+@pytest.mark.parametrize(
+    "make", [bomb, leave, link, nest, crowd, os.mkfifo, Path.mkdir, lambda path: path.write_text("PK")]
+)
+def test_no_archive_harms(make: Callable[[Path], object], tmp_path: Path) -> None:
+    make(tmp_path / "study.zip")
+    with pytest.raises(InputError, match="archive .*(is too large|outside|link|folders deep|larger|regular|damaged)"):
+        unpack_archive(tmp_path / "study.zip", tmp_path / "unpacked")
+    assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.name != "study.zip"]
