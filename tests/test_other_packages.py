@@ -1,46 +1,28 @@
-"""What reads or drives ours and is no part of the README's environment: Optuna, pygmo, ioh and iohinspector."""
+"""What reads or drives ours and is no part of the README's environment: pygmo, ioh and iohinspector."""
 
 import copy
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from compare.analysis.tuning import TRAINING_SEED, compute_area, tune_solvers
 
-from compare.analysis.comparison import Comparison, compare_problems
+from compare.analysis.comparison import Comparison
 from compare.analysis.record_statistics import compute_ecdf
 from compare.logs import write_ioh
-from compare.study.run import ProblemSpec, Stop
-from compare.study.settings import SolverSpec, StudySettings
-from compare.study.study import Study, run_study
 from nlp_gait import gaitbench
 from nlp_gait.formulation import Array
-from tests.backends.toys import corner, toy
 from tests.compare.test_logs import compare_baselines
 from tests.extras import need
 
-for package in ("optuna", "iohinspector"):  # first, for the others have no wheel on some machines
-    need(package)
+need("iohinspector")  # first, for the others have no wheel on some machines
 
 ID = "ssp-v5"
 BUDGET = 10_000
 TARGETS = 2_001  # of our distribution; iohinspector's has no end of them
 SOLVERS = ("pso", "random", "de")
-OWN = """
-import numpy as np
-
-def steps(f, lower, upper, evaluations, seed, *, length=1e-6):
-    x, rng = (lower + upper) / 2, np.random.default_rng(seed)
-    for k in range(evaluations):
-        y = x + length * (upper - lower) * rng.normal(size=len(x))
-        x = y if f(y) < f(x) else x
-
-steps.ranges = {"length": (1e-3, 0.3, "log")}
-"""
 
 
 @pytest.fixture(scope="module")
@@ -167,26 +149,3 @@ def test_the_header_is_what_ioh_itself_writes(ioh: Any, comparisons: list[Compar
     assert set(ours["scenarios"][0]) == set(theirs["scenarios"][0])
     assert set(ours["scenarios"][0]["runs"][0]) <= set(theirs["scenarios"][0]["runs"][0])
     assert set(ours["algorithm"]) == set(theirs["algorithm"])
-
-
-@pytest.mark.slow
-def test_a_tuned_search_is_better_and_the_same_again(tmp_path: Path) -> None:
-    file = tmp_path / "own.py"
-    file.write_text(OWN)
-    settings = StudySettings(
-        problems=(ProblemSpec(name=toy(corner)),),
-        solvers=(SolverSpec(name="random"), SolverSpec(name="de"), SolverSpec(name=f"{file}:steps")),
-        stop=Stop(evaluations=200),
-    )
-    said: list[str] = []
-    study = Study(runs=settings.make_runs(), folder=tmp_path / "study")
-    tuned = tune_solvers(study, settings, 7, said.append)
-    assert [solver.label or solver.name for solver in tuned.solvers][:3] == ["random", "de", "de-tuned"]
-    assert said[0] == "random has no settings to tune" and len(tuned.solvers) == 5
-    assert tune_solvers(replace(study, folder=None), settings, 7, said.append) == tuned
-    training = StudySettings(
-        problems=settings.problems, solvers=tuned.solvers, stop=settings.stop, runs=1, seed=TRAINING_SEED
-    )
-    gaps = {s.name: s.curves[0] for s in compare_problems(run_study(Study(runs=training.make_runs())))[0].solvers}
-    for name in ("de", next(name for name in gaps if name.endswith("steps"))):
-        assert compute_area(gaps[f"{name}-tuned"], 200) > compute_area(gaps[name], 200)

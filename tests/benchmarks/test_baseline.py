@@ -25,9 +25,7 @@ def runs() -> list[RunRecord]:
     study = baseline.make_bench_study([ID], *solvers, runs=3, evaluations=1000)
     records = run_study(Study(runs=study.make_runs()))
     infeasible = [
-        replace(r, verdict=replace(r.verdict, objective=math.nan, violation=1.0, feasible=False))
-        for r in records
-        if r.solver == "random"
+        replace(r, objective=math.nan, violation=1.0, feasible=False) for r in records if r.solver == "random"
     ]
     return [r for r in records if r.solver != "random"] + infeasible
 

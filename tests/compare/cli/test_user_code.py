@@ -39,7 +39,7 @@ def test_every_command_takes_them(mine: Path) -> None:
     assert verdict["objective"]["value"] == pytest.approx(best["objective"])
     search = "compare my.py:two_link --algorithms my.py:annealing --starts 0 --runs 1 --evaluations 300 --jobs 1"
     found = as_json(*search.split())
-    assert found["runs"][0]["evaluations"] == 300 and found["runs"][0]["verdict"]["feasible"]
+    assert found["runs"][0]["evaluations"] == 300 and found["runs"][0]["feasible"]
     assert "swing_rad" in nlp_gait("list", "my.py:two_link").stdout
     swept = ["sweep", "my.py:two_link", "--over", "speed_m_s=0.5,0.6", "--out", "sweep"]
     assert "speed_m_s" in nlp_gait(*swept, "--starts", "1").stdout
