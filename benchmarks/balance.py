@@ -25,7 +25,7 @@ from nlp_gait.simulation.balance.drives import choose_feedback
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import Bumps
 from nlp_gait.simulation.plan import Plan, make_plan
-from nlp_gait.simulation.simulate import TIME_STEP, Conditions, Push, Run
+from nlp_gait.simulation.simulate import TIME_STEP, Conditions, Push, SimulationRun
 
 FEEDBACKS = ("none", "balance")
 INSTANTS = 12  # of pushes, even over the inner steps
@@ -57,7 +57,7 @@ def load(path: str) -> tuple[str, Plan, float, float]:
     return plan.robot.name, plan, height, plan.robot.mass_kg * math.sqrt(plan.gravity * height)
 
 
-def falls(run: Run, impulse_Ns: tuple[float, float], settle_s: float) -> bool:
+def falls(run: SimulationRun, impulse_Ns: tuple[float, float], settle_s: float) -> bool:
     """Return whether a robot falls that is pushed now."""
     pushed = run.fork(Push(impulse_Ns=impulse_Ns, start_s=run.time_s, duration_s=PUSH_S))
     pushed.advance(run.time_s + settle_s)
@@ -65,7 +65,12 @@ def falls(run: Run, impulse_Ns: tuple[float, float], settle_s: float) -> bool:
 
 
 def bisect(
-    runs: list[Run], direction: str, unit_Ns: float, settle_s: float, falls_needed: int = 1, levels: int = LEVELS
+    runs: list[SimulationRun],
+    direction: str,
+    unit_Ns: float,
+    settle_s: float,
+    falls_needed: int = 1,
+    levels: int = LEVELS,
 ) -> tuple[float, float]:
     """Return neighbouring impulses [N s] of ``levels`` up to the largest: so many runs fall at the second, fewer at the first."""
     (x, y), low, high = DIRECTIONS[direction], 0, levels
@@ -87,7 +92,7 @@ def tabulate_pushes(paths: list[str]) -> Iterator[str]:
         name, plan, height, unit = load(path)
         settle = SETTLE * math.sqrt(height / plan.gravity)
         for feedback in FEEDBACKS:
-            run, forks = Run(plan, drive=choose_feedback(Drive(), feedback)), []
+            run, forks = SimulationRun(plan, drive=choose_feedback(Drive(), feedback)), []
             for k in range(INSTANTS):
                 if run.advance(plan.duration_s * (0.3 + 0.4 * (k + 0.5) / INSTANTS)):
                     forks.append(run.fork(Push(impulse_Ns=(0.0, 0.0), start_s=run.time_s)))
@@ -119,7 +124,7 @@ def describe_walks(plan: Plan, walks: list[tuple[Conditions, Drive]]) -> str:
     begin, end = plan.at("hip", np.array([0.0, plan.duration_s]))
     shares, way = list[float](), (end - begin) / ((end - begin) @ (end - begin))
     for conditions, drive in walks:
-        trace = Run(plan, conditions, drive).finish()
+        trace = SimulationRun(plan, conditions, drive).finish()
         if trace.fell_at_s is None:
             shares.append(float((trace.torso[-1] - trace.torso[0]) @ way))
     distance = f", {100.0 * np.mean(shares):.0f} %" if shares else ""
@@ -135,7 +140,7 @@ def tabulate_rest(paths: list[str]) -> Iterator[str]:
         step_ms = dict.fromkeys(("none", "balance"), 0.0)
         for feedback in step_ms:
             drive = choose_feedback(Drive(), feedback)
-            run, begin = Run(plan, drive=drive, settle_s=RECOVER / pendulum + 3.0), process_time()
+            run, begin = SimulationRun(plan, drive=drive, settle_s=RECOVER / pendulum + 3.0), process_time()
             run.advance(plan.duration_s + 2.0)
             step_ms[feedback] = 1e3 * (process_time() - begin) * TIME_STEP / run.time_s
             tick = ""
@@ -149,7 +154,7 @@ def tabulate_rest(paths: list[str]) -> Iterator[str]:
             yield cells(name, feedback, *(f"{share:.2f}" for share in shares), tick)
 
 
-def find_least_share(run: Run, direction: str, bound_Ns: float, settle_s: float) -> float:
+def find_least_share(run: SimulationRun, direction: str, bound_Ns: float, settle_s: float) -> float:
     """Return the least share of a bound [N s] that fells a robot, infinite if none does."""
     x, y = DIRECTIONS[direction]
     for share in np.arange(0.5, 3.0, RESOLUTION):
@@ -158,7 +163,7 @@ def find_least_share(run: Run, direction: str, bound_Ns: float, settle_s: float)
     return math.inf
 
 
-def find_bounds(plan: Plan, run: Run, pendulum: float) -> dict[str, float]:
+def find_bounds(plan: Plan, run: SimulationRun, pendulum: float) -> dict[str, float]:
     """Return the impulse by direction that takes the divergent component to the edge of the soles, m w d [N s]."""
     data = run.data
     places = data.site_xpos[[data.model.site(side).id for side in plan.robot.feet]]

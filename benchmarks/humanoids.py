@@ -34,7 +34,7 @@ from nlp_gait.simulation.balance.drives import choose_feedback
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import measure_walk
 from nlp_gait.simulation.plan import Plan, make_plan
-from nlp_gait.simulation.simulate import Push, Run, simulate_plan
+from nlp_gait.simulation.simulate import Push, SimulationRun, simulate_plan
 
 Row = dict[str, Any]
 
@@ -156,7 +156,7 @@ def push(name: str, folder: Path, row: Row) -> Row:
 
 def find_pushes(plan: Plan, drive: Drive, unit_Ns: float) -> dict[str, float]:
     """Bisect the impulse of pushes in the middle of two successive swings of the inner steps, by direction [N s]."""
-    run, forks = Run(plan, None, drive), []
+    run, forks = SimulationRun(plan, None, drive), []
     for begin, end in list_swings(plan)[3:5]:
         run.advance((begin + end) / 2)
         forks.append(run)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.measurements import ClimbMeasurements, Measurements, Walk
     from nlp_gait.simulation.plan import Plan
-    from nlp_gait.simulation.simulate import Conditions, Push, Run, Simulation
+    from nlp_gait.simulation.simulate import Conditions, Push, Simulation, SimulationRun
 
 DRIVE = (
     "feed-forward: set-points every 10 ms, linear between them, planned velocity and torque fed forward. held: each held for "
@@ -132,7 +132,7 @@ def simulate(
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
     from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, list_frames, make_skeleton
-    from nlp_gait.simulation.simulate import SETTLE_TIME, Run, prepare
+    from nlp_gait.simulation.simulate import SETTLE_TIME, SimulationRun, prepare
 
     load_mujoco(pictures=video is not None)
     if video is not None:
@@ -144,7 +144,7 @@ def simulate(
         plan = make_plan(result, steps)
     if video is not None:
         check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
-    simulation = Run(plan, conditions, drive, sole)
+    simulation = SimulationRun(plan, conditions, drive, sole)
     pushes, failures = _watch(simulation) if live else ([], [])
     trace, written = simulation.finish(), [path for path in (page, video) if path is not None]
     data, parts = _report(plan, trace, drive, pushes)
@@ -198,7 +198,7 @@ def _report(plan: Plan, trace: Simulation, drive: Drive, pushes: list[Push]) -> 
     return data, parts
 
 
-def _watch(simulation: Run) -> tuple[list[Push], list[str]]:
+def _watch(simulation: SimulationRun) -> tuple[list[Push], list[str]]:
     """Show a simulation; return the pushes of the arrow keys, and why there is no window: it is recorded without one."""
     from nlp_gait.simulation.live import watch
 

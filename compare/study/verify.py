@@ -109,7 +109,7 @@ def verify_study(
             except (GaitError, ValueError) as error:
                 rows.append(Difference(record.name, "not repeated", str(error)))
     chosen = [record for record in records if id(record) in runs]
-    random.SystemRandom().shuffle(chosen)  # nobody can predict which
+    random.SystemRandom().shuffle(chosen)  # the drawn ones cannot be predicted
     chosen = chosen[: math.ceil(share * len(chosen))]
     rows += _repeat(chosen, runs, progress)
     return Verification(_fold(rows), records, len(chosen), evaluated)

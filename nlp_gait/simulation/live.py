@@ -11,7 +11,7 @@ from typing import Any
 
 from nlp_gait.errors import MissingExtraError, OutputError
 from nlp_gait.simulation.engine import DISPLAYS
-from nlp_gait.simulation.simulate import Push, Run
+from nlp_gait.simulation.simulate import Push, SimulationRun
 
 FRAME_S = 1 / 60  # between two pictures
 PUSH_SHARE = 0.03  # impulse of a key, of mass sqrt(gravity height)
@@ -19,7 +19,7 @@ PUSH_SHARE = 0.03  # impulse of a key, of mass sqrt(gravity height)
 KEYS: Mapping[int, tuple[int, int]] = {265: (1, 0), 264: (-1, 0), 263: (0, 1), 262: (0, -1)}
 
 
-def watch(run: Run) -> list[Push]:
+def watch(run: SimulationRun) -> list[Push]:
     """Show a simulation in real time until it ends or the window is closed, and return the pushes of the arrow keys.
 
     Raises MissingExtraError without GLFW, and OutputError, before anything is simulated, where no window can be opened.

@@ -105,7 +105,7 @@ class Simulation:
         return Signals(joints=joints, arrays=arrays, columns=COLUMNS | driven)
 
 
-class Run:
+class SimulationRun:
     """A simulation in progress; ``data`` is the engine's present state."""
 
     def __init__(
@@ -216,7 +216,7 @@ class Run:
         """Push the robot from now on by this push instead of an earlier one."""
         self._conditions = replace(self._conditions, push=push)
 
-    def fork(self, push: Push) -> "Run":
+    def fork(self, push: Push) -> "SimulationRun":
         """Return a copy that is pushed; its trace begins here."""
         other = copy.copy(self)
         other.data, other._parts = copy.copy(self.data), []
@@ -239,7 +239,7 @@ def simulate_plan(
     sole: str = "rectangle",
 ) -> Simulation:
     """Simulate a gait from its planned state until it has settled or fallen, deterministically; raises MissingExtraError."""
-    return Run(plan, conditions, drive, sole).finish()
+    return SimulationRun(plan, conditions, drive, sole).finish()
 
 
 def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:

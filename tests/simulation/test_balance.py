@@ -28,7 +28,7 @@ from nlp_gait.simulation.balance.whole_body import Targets, Torques, WholeBodyQP
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.engine import Addresses, place_root  # noqa: E402
 from nlp_gait.simulation.mjcf import Bumps  # noqa: E402
-from nlp_gait.simulation.simulate import Conditions, Push, Run, prepare  # noqa: E402
+from nlp_gait.simulation.simulate import Conditions, Push, SimulationRun, prepare  # noqa: E402
 
 LIMITS = StepLimits(
     rate=6.0,
@@ -200,7 +200,9 @@ def test_a_robot_at_rest_steps_where_no_zmp_brings_it_back_and_a_foothold_does(
 ) -> None:
     reach, error = settings
     push = Push(impulse_Ns=(impulse_Ns, 0.0), start_s=0.6, duration_s=0.1)
-    run = Run(standing, Conditions(push=push), Drive(feedback=Balance(hold=0.0, reach=reach, step_error=error)))
+    run = SimulationRun(
+        standing, Conditions(push=push), Drive(feedback=Balance(hold=0.0, reach=reach, step_error=error))
+    )
     assert run.advance(0.6)
     balance = run._corrector
     assert isinstance(balance, WholeBodyBalance)
@@ -212,7 +214,7 @@ def test_a_robot_at_rest_steps_where_no_zmp_brings_it_back_and_a_foothold_does(
         assert balance.find_plan_time(1.0) >= 0.3  # the plan waits
 
 
-def advance(run: Run) -> Array:
+def advance(run: SimulationRun) -> Array:
     assert run.advance(0.8)
     return np.array(run.data.qpos)
 
@@ -223,7 +225,9 @@ def test_a_pushed_walk_stands_with_it_and_falls_without(
     plan: Plan, impulse_Ns: tuple[float, float], share: float
 ) -> None:
     conditions = Conditions(push=Push(impulse_Ns=impulse_Ns, start_s=share * plan.duration_s, duration_s=0.1))
-    alone, balanced = (Run(plan, conditions, drive).finish() for drive in (Drive(), Drive(feedback=Balance())))
+    alone, balanced = (
+        SimulationRun(plan, conditions, drive).finish() for drive in (Drive(), Drive(feedback=Balance()))
+    )
     assert alone.fell_at_s is not None and balanced.fell_at_s is None
 
 
@@ -232,7 +236,7 @@ def test_bumps_noise_and_delay_act_and_the_same_seed_gives_the_same_walk(plan: P
     settings = Balance(noise=1.0, delay_s=0.004)
     bumpy = Conditions(bumps=Bumps(height_m=0.004))
     first, again, other, flat = (
-        advance(Run(plan, conditions, Drive(feedback=balance)))
+        advance(SimulationRun(plan, conditions, Drive(feedback=balance)))
         for conditions, balance in (
             (bumpy, settings),
             (bumpy, settings),
@@ -246,7 +250,7 @@ def test_bumps_noise_and_delay_act_and_the_same_seed_gives_the_same_walk(plan: P
 
 def test_a_push_after_the_end_is_refused(standing: Plan) -> None:
     with pytest.raises(InputError, match=r"a push must begin from 0 s to the end of the simulation, 1.3 s, got 2 s"):
-        Run(standing, Conditions(push=Push(impulse_Ns=(1.0, 0.0), start_s=2.0)))
+        SimulationRun(standing, Conditions(push=Push(impulse_Ns=(1.0, 0.0), start_s=2.0)))
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ pytest.importorskip("glfw")
 from nlp_gait.simulation import live  # noqa: E402
 from nlp_gait.simulation.engine import DISPLAYS  # noqa: E402
 from nlp_gait.simulation.plan import Plan, make_plan  # noqa: E402
-from nlp_gait.simulation.simulate import Run, simulate_plan  # noqa: E402
+from nlp_gait.simulation.simulate import SimulationRun, simulate_plan  # noqa: E402
 
 UP, LEFT, OTHER = 265, 263, 32
 
@@ -86,7 +86,7 @@ def test_a_watched_simulation_is_the_same(plan: Plan, open_window: Callable[...,
     expected = simulate_plan(plan)
     for pictures in (10**6, 3):  # to the end, or until the window is closed
         open_window(OTHER, pictures=pictures)
-        run = Run(plan)
+        run = SimulationRun(plan)
         assert live.watch(run) == []
         np.testing.assert_array_equal(run.finish().states, expected.states)
 
@@ -96,7 +96,7 @@ def test_arrow_keys_push_forward_and_to_the_left(plan: Plan, open_window: Callab
     unpushed = simulate_plan(plan)
     for key, axis in ((UP, 0), (LEFT, 1)):
         open_window(OTHER, key)
-        run = Run(plan)
+        run = SimulationRun(plan)
         (push,) = live.watch(run)
         impulse = live.PUSH_SHARE * plan.robot.mass_kg * np.sqrt(9.8 * plan.at("hip", np.zeros(1))[0, 2])
         assert push.impulse_Ns[axis] == pytest.approx(impulse) and push.impulse_Ns[1 - axis] == 0.0
@@ -131,7 +131,7 @@ def test_a_display_that_does_not_answer_is_named(plan: Plan, monkeypatch: pytest
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setenv("DISPLAY", ":987")
     with pytest.raises(OutputError, match=r"cannot open a window on the display \(DISPLAY=:987\)"):
-        live.watch(Run(plan))
+        live.watch(SimulationRun(plan))
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from nlp_gait.simulation.joint_controller import GravityCompensation, JointContr
 from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.shapes import Capsule, Prism, make_shapes
-from nlp_gait.simulation.simulate import Conditions, Run, prepare
+from nlp_gait.simulation.simulate import Conditions, SimulationRun, prepare
 from tests.robots.crooked import crooked, crooked_urdf
 
 pytest.importorskip("mujoco")
@@ -120,7 +120,7 @@ def test_a_root_on_the_ground_that_is_named_world_is_the_same_robot(tmp_path: Pa
     for text in (crooked_urdf(), crooked_urdf().replace("</robot>", base)):
         problem = nlp_gait.load("humanoid-ssp", robot=crooked(tmp_path, text))
         plan = make_plan(result_of(problem, problem.start_point(np.random.default_rng(0))))
-        run = Run(plan)
+        run = SimulationRun(plan)
         assert run.advance(0.05) and run.fell_at_s is None
         traces.append(run.data.qpos.copy())
     assert plan.robot.root == "world_link"

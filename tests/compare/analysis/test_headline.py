@@ -52,7 +52,7 @@ def test_a_study_without_ipopt_is_measured_from_the_shipped_value(runs: list[Run
 def test_a_better_run_is_announced_and_offered(runs: list[RunRecord], tmp_path: Path) -> None:
     comparison = compare_with(Reference(objective=0.5, source="shipped, best of 2 starts"), runs)
     shown = comparison.format_gap(-comparison.gap(comparison.solvers[0].costs[0]))
-    assert f"found a new best value, {max(r.verdict.objective for r in runs):.6f}: {shown} better." in write_headline(
+    assert f"found a new best value, {max(r.objective for r in runs):.6f}: {shown} better." in write_headline(
         comparison
     )
     assert comparison.gap(comparison.solvers[0].costs[0]) < 0.0
@@ -187,7 +187,7 @@ def test_what_is_maximised_ends_below_the_optimum() -> None:
 
 
 def test_two_solvers_without_evaluations_or_times_are_compared() -> None:
-    runs = [replace(r, evaluations={}, time_s=Times()) for r in make_runs(ipopt=[10.0] * 3)]
+    runs = [replace(r, counts={}, time_s=Times()) for r in make_runs(ipopt=[10.0] * 3)]
     assert describe(runs, PROVEN) == "IPOPT reaches the proven optimum of 10.000000 W from all 3 starts."
 
 

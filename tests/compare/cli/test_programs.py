@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.compare.cli.calls import nlp_gait, one_sentence
+from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
 PROGRAM = """
 import json, random, sys, shared
@@ -41,7 +41,10 @@ def test_a_program_takes_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     nlp_gait("compare", "--resume", "--out", "study", "--code", command)
     assert read_points("study") == points
     nlp_gait("verify", "study", "--pack", "study.zip", "--code", command)
-    assert "3 rows" not in nlp_gait("verify", "study.zip").stdout
+    (row,) = as_json("verify", "study.zip")["rows"]
+    assert row["kind"] == "not repeated" and row["why"].endswith("is packed, and runs only with --run-code")
+    everything = "4 points evaluated and 4 of 4 runs repeated: nothing differs"
+    assert as_json("verify", "study.zip", "--run-code")["sentence"] == everything
     Path("shared.py").write_text("ROWS = 30\n")
     nlp_gait("compare", "--resume", "--out", "study", "--code", command)
     assert len(read_points("study")) == 4

@@ -36,9 +36,7 @@ def no_luck(*arguments: object) -> None:
 
 
 def test_a_run_without_a_point_ends_the_reproduction_and_says_why(tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match="walk12, no_luck, run 0 failed: ValueError: no luck; fix this and delete"
-    ):
+    with pytest.raises(InputError, match="walk12, no_luck, run 0 failed: ValueError: no luck; fix this and delete"):
         Runner(folder=tmp_path, jobs=1).run_tasks([Run(problem=WALK, solver=no_luck)])
 
 

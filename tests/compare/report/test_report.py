@@ -62,7 +62,7 @@ class Tables(HTMLParser):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report")
-    write_report(out, [replace(r, versions={"processor": "abacus"}) for r in study()], FILE)
+    write_report(out, [replace(r, versions={"processor": "abacus", "nlp-gait": "1.0"}) for r in study()], FILE)
     return out
 
 

@@ -15,7 +15,7 @@ from compare.report.latex import format_latex_table
 from compare.report.study_report import make_study_document
 from compare.study.record import RunRecord
 from compare.study.run import ProblemSpec, Run, Stop
-from compare.study.study import Study, run_study
+from compare.study.study import Study, StudyFile, run_study
 
 EMPTY = Document(title="", parts=())
 
