@@ -84,7 +84,7 @@ def _belongs_here(record: logging.LogRecord) -> bool:
 
 
 def _describe_robot(name: str, target: Path | None) -> Output:
-    from nlp_gait.gaits.humanoid.body import describe_humanoid, make_humanoid
+    from nlp_gait.gaits.humanoid.body import JOINT_COLUMNS, describe_humanoid, list_joints, make_humanoid
 
     log = logging.getLogger("nlp_gait")
     log.addFilter(_belongs_here)  # what it refers to is printed below
@@ -98,10 +98,18 @@ def _describe_robot(name: str, target: Path | None) -> Output:
         from compare.drawing.robot_figures import plot_robot
 
         written = (plot_robot(body.biped, target.with_suffix(".png")),)
-    table = Rows(f"Robot {title} as read", ("item", "value"), facts)
+    table, joints = Rows(f"Robot {title} as read", ("item", "value"), facts), list_joints(body)
+    both = (
+        "Joints of the left leg: range, limits, rotor, damping; left / right where they differ: the tighter is planned"
+    )
     return Output(
-        data={"robot": title, **dict(facts), "notes": list(notes)},
-        parts=[table, *(f"note: {note}" for note in notes), OVERRIDE.format(name)],
+        data={
+            "robot": title,
+            **dict(facts),
+            "joints": [dict(zip(JOINT_COLUMNS, row, strict=True)) for row in joints],
+            "notes": list(notes),
+        },
+        parts=[table, Rows(both, JOINT_COLUMNS, joints), *(f"note: {note}" for note in notes), OVERRIDE.format(name)],
         written=written,
     )
 

@@ -149,6 +149,8 @@ def plan_walk(
 ) -> WalkPlan:
     """Plan a straight walk from standing to standing with least energy per metre.
 
+    If left and right of a humanoid differ, its steps have the usual length and are planned one by one.
+
     Args:
         robot: name or file; robots of NAO's build swing their arms and have closed-form legs, others are planned as humanoids.
         steps: swings of a foot, both half steps included; None for 10, or for as many as the distance takes.
@@ -161,6 +163,11 @@ def plan_walk(
     """
     _check_positive(speed_m_s=speed_m_s, distance_m=distance_m)
     body = make_body(robot)
+    if isinstance(body, Humanoid) and body.biped.differences and not slope_deg:  # every step has its own side
+        if steps is None and distance_m is not None:
+            steps = max(HALF_STEPS, round(distance_m / body.step_length_m) + 1)
+        speeds = () if speed_m_s is None else (speed_m_s,)
+        return plan_route(robot, steps=steps, distance_m=distance_m, speeds_m_s=speeds, settings=settings)
     walk = f"{body.family}-walk"
     count = 10 if steps is None else check_count("steps", steps, at_least=HALF_STEPS)
     problem = load(walk, robot=robot, steps=count, slope_deg=slope_deg, **settings.options)
@@ -298,7 +305,8 @@ def _load_cycle(problem: GaitProblem, step_m: float | None) -> GaitProblem:
     """Return the cycle from whose gait a walk starts, with steps of a length [m] or, if that is fixed, of the walk's."""
     options = problem.options
     name = problem.name.replace("walk", "cycle")
-    cycle = load(name, robot=options["robot"], intervals=options["intervals"])
+    sides = {"alike": True} if "alike" in options else {}  # it is only where a solver starts
+    cycle = load(name, robot=options["robot"], intervals=options["intervals"], **sides)
     if step_m is None and problem.value(f"{STEP}.lower") == problem.value(f"{STEP}.upper"):
         step_m = problem.value(f"{STEP}.lower")
     if step_m is None:

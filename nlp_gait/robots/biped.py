@@ -1,20 +1,33 @@
 """Robots as bipeds: two legs of six turning joints, all other links one body in a posture; scales and swings against NAO's."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.robots.inference import SIDES
+from nlp_gait.robots.inference import EXTENTS, SIDES
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg, make_leg
 from nlp_gait.robots.robot import Joint, Robot
-from nlp_gait.robots.tree import pose_robot, weld
+from nlp_gait.robots.tree import (
+    MIRROR,
+    MIRROR_COSINE,
+    MIRROR_M,
+    Mass,
+    combine_masses,
+    compare_axes,
+    compute_point_inertia,
+    mirror_sign,
+    pose_robot,
+    weld,
+)
 
 # NAO V5: a leg from hip to ankle [m], the mass [kg], and the heat constant K of the paper [W/(Nm)^2].
 NAO_LEG_M, NAO_MASS_KG, NAO_HEAT_W_PER_NM2 = 0.2029, 5.30535, 0.025
-ALIKE_M = 2e-3  # both legs are mirror images to this [m]
+GRAVITY = 9.81  # [m/s^2]
+NOMINAL_TORQUE = 0.5  # of drives of joints without a limit, as a share of weight times leg length
+ALIKE = 0.02  # share by which quantities of both sides may differ
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,6 +38,9 @@ class Biped:
     model: Robot  # with the joints of the legs only, all others held in the posture
     legs: Mapping[str, Leg]  # ``"left"`` and ``"right"``
     posture_rad: Mapping[str, float]  # angles of the held joints
+    differences: tuple[
+        str, ...
+    ]  # of both sides, see ``find_differences``; none if a step and its mirror image are alike
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -99,9 +115,22 @@ def make_biped_model(robot: Robot) -> Biped:
         raise InputError(f"robot {robot.name!r}: posture_rad must leave joint {turned[0]!r} above both legs at zero")
     full = pose_robot(robot, held)
     model = weld(full, list(held))
+    for joint in moving:
+        if fault := robot.unusable.get(joint):
+            raise InputError(f"robot {robot.name!r}: joint {joint!r} of a leg {fault}")
+    pairs = [(left.name, right.name) for left, right in zip(*single, strict=True)]
+    notes = list(robot.notes)
+    model = _tighten(model, pairs, notes)
     legs: dict[str, Leg] = {side: make_leg(model, side) for side in SIDES}
-    _check_alike(robot.name, legs)
-    return Biped(full=full, model=model, legs=legs, posture_rad=held)
+    nominal = NOMINAL_TORQUE * robot.mass_kg * GRAVITY * legs["left"].length_m
+    joints = {name: replace(joint, nominal_torque_Nm=nominal) for name, joint in model.joints.items()}
+    return Biped(
+        full=replace(full, notes=tuple(notes)),
+        model=replace(model, joints=joints),
+        legs=legs,
+        posture_rad=held,
+        differences=find_differences(model),
+    )
 
 
 def _choose_held_angle(joint: Joint, posture: Mapping[str, float]) -> float:
@@ -114,18 +143,93 @@ def _choose_held_angle(joint: Joint, posture: Mapping[str, float]) -> float:
     return angle
 
 
-def _check_alike(name: str, legs: Mapping[str, Leg]) -> None:
-    left, right = (legs[side] for side in SIDES)
-    image = np.array([1.0, -1.0, 1.0])
-    for mine, opposite, joint in zip(left.points, right.points, left.joints, strict=True):
-        if math.dist(image * mine, opposite) > ALIKE_M:
-            raise InputError(
-                f"robot {name!r}: legs must be mirror images to {1e3 * ALIKE_M:g} mm, joint {joint!r} is at {mine.tolist()}, its "
-                f"image at {opposite.tolist()}"
+def _tighten(robot: Robot, pairs: Sequence[tuple[str, str]], notes: list[str]) -> Robot:
+    """Give both joints of each pair the tighter limits of the two: a step and its mirror image are planned as one."""
+    joints = dict(robot.joints)
+    for pair in pairs:
+        one, opposite = (joints[name] for name in pair)
+        sign = mirror_sign(robot, *pair)
+        low, high = opposite.planning_limits_rad[:: int(sign)]
+        limits = [
+            ("lower limits", "rad", one.planning_limits_rad[0], sign * low, max),
+            ("upper limits", "rad", one.planning_limits_rad[1], sign * high, min),
+            ("limits of torque", "Nm", one.torque_limit_Nm, opposite.torque_limit_Nm, min),
+            ("limits of speed", "rad/s", one.velocity_limit_rad_s, opposite.velocity_limit_rad_s, min),
+        ]
+        for words, unit, mine, other, pick in limits:
+            if abs(mine - other) > ALIKE * max(abs(mine), abs(other)):
+                notes.append(
+                    f"{pair[0]} and {pair[1]} have different {words}, {mine:.4g} and {other:.4g} {unit}: both have "
+                    f"{pick(mine, other):.4g} {unit}"
+                )
+        least, most, torque, speed = (pick(mine, other) for _, _, mine, other, pick in limits)
+        for joint, (lower, upper) in ((one, (least, most)), (opposite, sorted((sign * least, sign * most)))):
+            if not least < most:
+                raise InputError(
+                    f"robot {robot.name!r}: joints {pair[0]!r} and {pair[1]!r}, mirrored, have no common range: "
+                    f"{one.planning_limits_rad} and {opposite.planning_limits_rad} rad"
+                )
+            joints[joint.name] = replace(
+                joint,
+                planning_limits_rad=(lower, upper),
+                torque_limit_Nm=torque,
+                velocity_limit_rad_s=speed,
             )
+    return replace(robot, joints=joints)
 
 
-GRAVITY = 9.81  # [m/s^2]
+def _gather(robot: Robot, joint: str) -> Mass:
+    """Return the mass of all links below a joint, from the root."""
+    above = robot.joint(joint)
+    path = robot.path_to_root(above.child)
+    masses, waiting = [], [(above.child, np.sum([each.origin_m for each in path], axis=0))]
+    while waiting:
+        name, place = waiting.pop()
+        masses.append(Mass.of_link(robot.links[name]).move(place))
+        below = [other for other in robot.joints.values() if other.parent == name]
+        waiting += [(other.child, place + other.origin_m) for other in below]
+    return combine_masses(masses)
+
+
+def find_differences(robot: Robot) -> tuple[str, ...]:
+    """Return what makes a mirrored step another one: axes, masses, centres, tensors, rotors and soles that differ by over 2 %.
+
+    The links below a joint count together, with tensors about a point of its axis and centres in units of their radius of
+    gyration about it; heights and edges of soles count in units of their length.
+    """
+    differences = []
+    left, right = (robot.feet[side] for side in SIDES)
+    edges = ((name, {"left_m": "right_m", "right_m": "left_m"}.get(name, name)) for name in EXTENTS)
+    apart = max(abs(getattr(left, one) - getattr(right, other)) for one, other in edges)
+    if apart > ALIKE * (left.front_m + left.back_m):
+        differences.append(f"edges of the soles by up to {1e3 * apart:.1f} mm")
+    legs = [make_leg(robot, side) for side in SIDES]
+    mirror = np.outer(MIRROR, MIRROR)
+    for k, names in enumerate(zip(*(leg.joints for leg in legs), strict=True)):
+        points, axes = [leg.points[k] for leg in legs], [leg.axes[k] for leg in legs]
+        where = f"{names[0]} and {names[1]}"
+        gap, angle = compare_axes(MIRROR * points[0], MIRROR * axes[0], points[1], axes[1])
+        if gap > MIRROR_M or math.cos(angle) < MIRROR_COSINE:
+            differences.append(f"axes of {where} by {1e3 * gap:.1f} mm and {math.degrees(angle):.1f} degrees")
+        one, opposite = (_gather(robot, name) for name in names)
+        origins = points[0], MIRROR * points[0]
+        tensors = [
+            body.tensor_kgm2 + compute_point_inertia(body.mass_kg, body.com_m - origin)
+            for body, origin in zip((one, opposite), origins, strict=True)
+        ]
+        radius = math.sqrt(float(np.trace(tensors[0])) / (2 * one.mass_kg))
+        rotors = [robot.joint(name).armature_kgm2 for name in names]
+        for what, difference in (
+            ("masses below", abs(one.mass_kg - opposite.mass_kg) / one.mass_kg),
+            ("centres of mass below", float(np.linalg.norm(MIRROR * one.com_m - opposite.com_m)) / radius),
+            ("inertias below", float(np.linalg.norm(mirror * tensors[0] - tensors[1]) / np.linalg.norm(tensors[0]))),
+            ("rotors at", abs(rotors[0] - rotors[1]) / (max(rotors) or 1.0)),
+        ):
+            if difference > ALIKE:
+                differences.append(f"{what} {where} by {difference:.1%}")
+    return tuple(differences)
+
+
 STEP_M = 0.06  # NAO's, from foot to foot
 NAO_SWING_S = 0.4  # least time of NAO's swings in its papers
 LIKE_NAO = 0.1  # legs whose length differs by at most this share from NAO's have the papers' bounds

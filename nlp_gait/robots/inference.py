@@ -10,7 +10,13 @@ import numpy as np
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, find_bend
 from nlp_gait.robots.robot import Joint
-from nlp_gait.robots.tree import Array, are_mirror_images, turn_parts
+from nlp_gait.robots.tree import (
+    LEAST_SINE,
+    Array,
+    compare_axes,
+    find_nearest_on_axis,
+    turn_parts,
+)
 from nlp_gait.robots.welding import Joints, Links, ReadShapes
 
 Side = Literal["left", "right"]
@@ -23,6 +29,8 @@ FORWARD_ANGLES = {"x": 0.0, "y": -math.pi / 2, "-x": math.pi, "-y": math.pi / 2}
 SOLE_THICKNESS_M = 0.004  # points of a foot this close to its lowest one are on the ground
 CLEARLY_LOWER_M = 0.1  # the joints of the feet are lower than those of any other mirrored pair by this
 CLEAR_LEAD_M = 0.03  # soles whose parts in front of and behind the ankle differ by this show the forward direction
+NEGLIGIBLE_INERTIA = 0.01  # of a link, as a share of that of the robot's mass at its size
+PAIRED_M, PAIRED_COSINE = 1e-2, 0.99  # axes of a pair of joints are images of each other to this
 LEAST_WIDTH_M = 0.01  # a narrower sole is a line or a point
 
 
@@ -57,6 +65,17 @@ class Legs(NamedTuple):
         """Links that the joints of the legs carry."""
         return {placed.joint.child for chain in self.chains for placed in chain}
 
+    @property
+    def ankles_m(self) -> tuple[Array, Array]:
+        """Point of each leg's last axis that is nearest to the one before."""
+        one, opposite = (_find_nearest(*chain[:2]) for chain in self.chains)
+        return one, opposite
+
+    @property
+    def hip_m(self) -> Array:
+        """Point of the first axis of one leg that is nearest to the next one."""
+        return _find_nearest(*self.chains[0][:-3:-1])
+
 
 def find_legs(robot: str, links: Links, joints: Joints, feet: Feet) -> Legs:
     """Find the legs by the feet of the robot file, by side, or else by geometry.
@@ -70,32 +89,31 @@ def find_legs(robot: str, links: Links, joints: Joints, feet: Feet) -> Legs:
         left, right = (str(feet.get(side, {}).get("link")) for side in SIDES)
         return Legs((left, right), _split_chains(chains.get(left, []), chains.get(right, [])))
     candidates: list[tuple[float, Legs]] = []
-    others_m: list[tuple[float, str, tuple[str, str]]] = []
+    failed: list[tuple[tuple[bool, float, int], str, tuple[str, str]]] = []
     for pair in combinations(sorted(chains), 2):
-        split = _split_chains(chains[pair[0]], chains[pair[1]])
-        count = len(split[0])
-        if count != len(split[1]) or not count or not _are_mirror_chains(*split):
+        legs = Legs(pair, _split_chains(chains[pair[0]], chains[pair[1]]))
+        count = len(legs.chains[0])
+        if count != len(legs.chains[1]) or not count:
             continue
-        legs = Legs(pair, split)
-        if _are_arms(legs, links, chains):
-            others_m.append(
-                (split[0][0].place[2], "belongs to arms: they begin above the other links' centre of mass", pair)
-            )
-        elif count != LEG_JOINT_COUNT:
-            others_m.append((split[0][0].place[2], f"has legs of {count} joints, which is not supported", pair))
+        heights = [float(ankle[2]) for ankle in legs.ankles_m]
+        fault, are_arms = _find_mirror_fault(legs), _are_arms(legs, links, chains)
+        if are_arms and not fault:
+            fault = "belongs to arms: they begin above the other links' centre of mass"
+        elif count != LEG_JOINT_COUNT and not fault:
+            fault = f"has legs of {count} joints, which is not supported"
+        if fault:
+            failed.append(((are_arms, round(max(heights), 2), -count), fault, pair))
         else:
-            candidates.append((split[0][0].place[2], legs))
+            candidates.append((heights[0], legs))
     remedy = (
         'name the feet in the JSON file next to the model: "feet": {"left": {"link": "..."}, "right": {"link": "..."}} '
         "(docs/robots.md describes the supported legs)"
     )
     if not candidates:
-        _, fault, pair = min(others_m, default=(0.0, "", ("", "")))
-        hint = (
-            f"the lowest pair, {pair[0]!r} and {pair[1]!r}, {fault}; if other links are the feet, "
-            if fault
-            else "no links are mirror images; if z is not up in the root's axes, join a turned link to it, else "
-        )
+        hint = "no two links have the same number of turning joints below where they meet; "
+        if failed:
+            _, fault, pair = min(failed)
+            hint = f"the lowest pair, {pair[0]!r} and {pair[1]!r}, {fault}; if other links are the feet, "
         raise RobotDataError(
             f"robot {robot!r}: no feet found: two links, mirror images of each other (z is up), with {LEG_JOINT_COUNT} turning "
             f"joints each below the link where both legs meet; {hint}{remedy}"
@@ -106,6 +124,71 @@ def find_legs(robot: str, links: Links, joints: Joints, feet: Feet) -> Legs:
         listed = "; ".join("{!r} and {!r}".format(*legs.feet) for legs in (lowest, *rivals))
         raise RobotDataError(f"robot {robot!r}: several pairs of links may be the feet: {listed}; {remedy}")
     return lowest
+
+
+def find_middle(legs: Legs) -> Array:
+    """Return the place (3,) of the plane of symmetry: the middle of the legs along the axis that separates them, else zero."""
+    across = int(np.argmax(np.abs(np.subtract(*legs.ankles_m))[:2]))
+    middle = np.zeros(3)
+    # A joint's origin may be anywhere on its axis, so that an axis across the plane does not show where it is.
+    places = [
+        (one.place[across] + opposite.place[across]) / 2
+        for one, opposite in zip(*legs.chains, strict=False)
+        if abs(one.joint.axis[across]) < LEAST_SINE
+    ]
+    middle[across] = np.median(places) if places else 0.0
+    return middle
+
+
+def _find_mirror_fault(legs: Legs) -> str:
+    """Return which joints of two legs are not mirror images, the nearest to the body first, in words; "" if all are."""
+    middle = find_middle(legs)
+    across = int(np.argmax(np.abs(np.subtract(*legs.ankles_m))[:2]))
+    mirror = np.ones(3)
+    mirror[across] = -1.0
+    for one, opposite in reversed(list(zip(*legs.chains, strict=True))):
+        names = f"{one.joint.name!r} and {opposite.joint.name!r}"
+        for joint in (one.joint, opposite.joint):
+            if not any(joint.axis):
+                return f"turns about the axis 0 0 0 at {joint.name!r}"
+        gap, angle = compare_axes(
+            mirror * (one.place - middle),
+            mirror * one.joint.axis,
+            opposite.place - middle,
+            np.array(opposite.joint.axis),
+        )
+        if gap > PAIRED_M or math.cos(angle) < PAIRED_COSINE:
+            return (
+                f"is not mirrored: the axes of {names} are {1e3 * gap:.1f} mm and {math.degrees(angle):.1f} degrees from being "
+                f"images, and may be {1e3 * PAIRED_M:g} mm and {math.degrees(math.acos(PAIRED_COSINE)):.1f} degrees"
+            )
+    if abs(float(np.subtract(*legs.ankles_m)[across])) <= LEAST_WIDTH_M:
+        return "has both ankles at one place"
+    return ""
+
+
+def _find_nearest(placed: PlacedJoint, other: PlacedJoint | None = None) -> Array:
+    """Return the point (3,) of a joint's axis that is nearest to another one's; its origin without another one."""
+    if other is None:
+        return placed.place
+    return find_nearest_on_axis(placed.place, np.array(placed.joint.axis), other.place, np.array(other.joint.axis))
+
+
+def check_sizes(robot: str, links: Links, joints: Joints, notes: list[str]) -> None:
+    """Raise RobotDataError for a link whose matter is spread further than the robot is large, if its inertia matters."""
+    places = [chain[0].place for chain in _find_chains(joints).values()]
+    size = float(np.linalg.norm(np.ptp(places, axis=0)))
+    mass_kg = sum(link.mass_kg for link in links.values())
+    for name, link in links.items():
+        radius = math.sqrt(max(float(np.trace(link.inertia_matrix)), 0.0) / (2 * link.mass_kg))
+        if radius <= size:
+            continue
+        fault = f"the tensor of {name!r} spreads {link.mass_kg:.3g} kg by {radius:.3g} m, and all joints are within {size:.3g} m"
+        if link.mass_kg * radius**2 > NEGLIGIBLE_INERTIA * mass_kg * size**2:
+            raise RobotDataError(
+                f"robot {robot!r}: {fault}; tensors are in kg m^2: is it in kg mm^2, or of another scale?"
+            )
+        notes.append(f"{fault}; it is too light to matter")
 
 
 def infer_feet(
@@ -129,16 +212,19 @@ def infer_feet(
                 f"robot {robot!r}: a leg must have {LEG_JOINT_COUNT} turning joints from where both legs meet to the foot, "
                 f"{link!r} has {len(chain)}: {', '.join(placed.joint.child for placed in chain) or 'none'}"
             )
-    _check_knees(robot, legs.chains)
-    soles = [_find_sole(robot, link, read_shapes) for link in legs.feet]
-    angle = FORWARD_ANGLES[forward] if forward else _find_forward(robot, legs.chains, soles)
+    _check_knees(robot, legs)
+    soles = [
+        _find_sole(robot, link, read_shapes, ankle - chain[0].place, float(np.linalg.norm(legs.hip_m - ankle)))
+        for link, chain, ankle in zip(legs.feet, legs.chains, legs.ankles_m, strict=True)
+    ]
+    angle = FORWARD_ANGLES[forward] if forward else _find_forward(robot, legs, soles, notes)
     c, s = round(math.cos(angle)), round(math.sin(angle))  # exact: quarter turns
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     if angle:
         degrees = math.degrees(angle)
         notes.append(f"forward is not along the root's x axis: the robot was turned by {degrees:.0f} degrees about z")
         turn_parts(links, joints, turn)
-    across = [float((turn @ chain[0].place)[1]) for chain in legs.chains]
+    across = [float((turn @ ankle)[1]) for ankle in legs.ankles_m]
     sides = SIDES if across[0] > across[1] else SIDES[::-1]
     if feet and sides[0] != "left":
         raise RobotDataError(
@@ -178,28 +264,18 @@ def _split_chains(first: Chain, second: Chain) -> tuple[Chain, Chain]:
     return one, opposite
 
 
-def _are_mirror_chains(one: Chain, opposite: Chain) -> bool:
-    return any(
-        all(
-            are_mirror_images(a.place, np.array(a.joint.axis), b.place, np.array(b.joint.axis), across)
-            for a, b in zip(one, opposite, strict=True)
-        )
-        and abs(one[0].place[across] - opposite[0].place[across]) > LEAST_WIDTH_M
-        for across in (1, 0)
-    )
-
-
 def _are_arms(legs: Legs, links: Links, chains: Mapping[str, Chain]) -> bool:
     """Return whether the limbs begin above the centre of mass of all other links, at zero angles."""
     remaining = [link for name, link in links.items() if name not in legs.links]
     mass = sum(link.mass_kg for link in remaining)
     heights = {name: chain[0].place[2] for name, chain in chains.items()}
     moment = sum(link.mass_kg * (heights.get(link.name, 0.0) + link.com_m[2]) for link in remaining)
-    return bool(mass > 0.0 and legs.chains[0][-1].place[2] > moment / mass)
+    return bool(mass > 0.0 and legs.hip_m[2] > moment / mass)
 
 
-def _find_sole(robot: str, link: str, read_shapes: ReadShapes) -> InferredSole:
-    points, kind, missing = read_shapes(link)
+def _find_sole(robot: str, link: str, read_shapes: ReadShapes, ankle_m: Array, leg_m: float) -> InferredSole:
+    """Return the sole of a foot, from an ankle (3,) that is given from its joint's origin, under a leg of a length."""
+    points, kind, missing, others = read_shapes(link)
     write = (
         'write its sole into the JSON file next to the model: "ankle_height_m", "front_m", "back_m", "left_m", "right_m" '
         "(see docs/robots.md)"
@@ -210,7 +286,9 @@ def _find_sole(robot: str, link: str, read_shapes: ReadShapes) -> InferredSole:
             f"its package's folder in ROS_PACKAGE_PATH, or {write}"
         )
     if not len(points):
-        raise RobotDataError(f"robot {robot!r}: {link!r} has no shape for its sole; {write}")
+        found = f"only shapes that are not flat, {', '.join(sorted(set(others)))}" if others else "no shape"
+        raise RobotDataError(f"robot {robot!r}: {link!r} has {found} for its sole; {write}")
+    points = points - ankle_m
     on_ground = points[points[:, 2] < points[:, 2].min() + SOLE_THICKNESS_M]
     low, high = on_ground.min(axis=0), on_ground.max(axis=0)
     if min(high[:2] - low[:2]) < LEAST_WIDTH_M:
@@ -219,46 +297,61 @@ def _find_sole(robot: str, link: str, read_shapes: ReadShapes) -> InferredSole:
             f"{1e3 * (high[1] - low[1]):.1f} mm: no flat sole. Soles that are tilted at zero angles are not supported; "
             f"else {write}"
         )
+    if max(high[:2] - low[:2]) > leg_m:
+        raise RobotDataError(
+            f"robot {robot!r}: the sole of {link!r} would be {high[0] - low[0]:.3g} m by {high[1] - low[1]:.3g} m, and its leg "
+            f'is {leg_m:.3g} m long; is its mesh in mm? Write scale="0.001 0.001 0.001" into <mesh>'
+        )
+    if (low[:2] > 0.0).any() or (high[:2] <= 0.0).any():
+        x, y = (max(least, -most, 0.0) for least, most in zip(low[:2], high[:2], strict=True))
+        raise RobotDataError(
+            f"robot {robot!r}: the sole of {link!r} begins {1e3 * math.hypot(x, y):.0f} mm beside the point below its ankle, "
+            f"where the last two axes are nearest; soles must lie below the ankle; {write}"
+        )
     return InferredSole(-float(points[:, 2].min()), low[:2], high[:2], len(on_ground), kind)
 
 
-def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[InferredSole]) -> float:
+def _find_forward(robot: str, legs: Legs, soles: list[InferredSole], notes: list[str]) -> float:
     """Return the angle about z that turns the forward direction to x: a multiple of a quarter turn [rad].
 
     Forward is perpendicular to the line between the feet, and knees bend so that the feet go back; the longer part of the soles
-    must not contradict, and decides where knees may turn equally far both ways.
+    must not contradict, and decides where knees may turn equally far both ways; else it is along the positive axis.
     """
-    between = chains[0][0].place - chains[1][0].place
+    between = np.subtract(*legs.ankles_m)
     axis = 0 if abs(between[1]) >= abs(between[0]) else 1  # forward is along it
-    knee = sum(_find_knee_direction(chain)[axis] for chain in chains)
+    knee = sum(direction[axis] for direction in _find_knee_directions(legs))
     lead = sum(sole.high[axis] + sole.low[axis] for sole in soles) / 2
     if abs(lead) < CLEAR_LEAD_M:
         lead = 0.0
-    if lead * knee < 0 or not (lead or knee):
-        fault = (
-            "contradict each other" if knee else "do not show it: knees turn equally far both ways, soles are centred"
-        )
+    if not (lead or knee):
+        notes.append(f"neither knees nor soles show the forward direction: it is taken along {'xy'[axis]}")
+        lead = 1.0
+    if lead * knee < 0:
         raise RobotDataError(
-            f"robot {robot!r}: knees {chains[0][2].joint.child!r} and {chains[1][2].joint.child!r} and the soles {fault}; "
-            'write the forward direction: "forward": "x", "-x", "y" or "-y" into the JSON file next to the model'
+            f"robot {robot!r}: knees {legs.chains[0][2].joint.child!r} and {legs.chains[1][2].joint.child!r} and the soles "
+            'contradict each other; write the forward direction: "forward": "x", "-x", "y" or "-y" into the JSON file next to '
+            "the model"
         )
     return FORWARD_ANGLES[f"{'' if (knee or lead) > 0 else '-'}{'xy'[axis]}"]
 
 
-def _check_knees(robot: str, chains: tuple[Chain, Chain]) -> None:
+def _check_knees(robot: str, legs: Legs) -> None:
     """Raise RobotDataError if the limits of both knees make them bend in opposite directions."""
-    one, opposite = (_find_knee_direction(chain) for chain in chains)
+    one, opposite = _find_knee_directions(legs)
     if float(one @ opposite) < 0:
         ranges = " and ".join(
             f"{knee.child!r} by {knee.limits_rad[0]:.3g} to {knee.limits_rad[1]:.3g} rad about {np.round(knee.axis, 3) + 0.0}"
-            for knee in (chain[2].joint for chain in chains)
+            for knee in (chain[2].joint for chain in legs.chains)
         )
         raise RobotDataError(
             f"robot {robot!r}: its knees bend in opposite directions, {ranges}; correct the axis or the limits of one of them"
         )
 
 
-def _find_knee_direction(chain: Chain) -> Array:
-    """Return the direction (3,) in which the knee points when it bends, 0 if its limits do not show it."""
-    _, fifth, knee, *_ = chain
-    return np.asarray(-find_bend(*knee.joint.limits_rad) * np.cross(knee.joint.axis, fifth.place - knee.place))
+def _find_knee_directions(legs: Legs) -> list[Array]:
+    """Return the direction (3,) in which each knee points when it bends, 0 if its limits do not show it."""
+    directions = []
+    for chain, ankle in zip(legs.chains, legs.ankles_m, strict=True):
+        knee = chain[2]
+        directions.append(-find_bend(*knee.joint.limits_rad) * np.cross(knee.joint.axis, ankle - knee.place))
+    return directions

@@ -8,11 +8,10 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.robots.robot import Robot
-from nlp_gait.robots.tree import Array
+from nlp_gait.robots.tree import LEAST_SINE, Array
 
 LEG_JOINT_COUNT = 6
 MEETING_M = 1e-9  # axes this close to a point pass through it; smaller than the rounding of published origins
-LEAST_SINE = 0.1  # least sine of the angle between axes that must not be parallel
 SHORTEST_M = 1e-3
 CLEAR_RANGE = 1.5  # a knee bends to the side on which its range is this many times the other side's
 

@@ -1,6 +1,7 @@
 """Robots from files: JSON, URDF and MJCF. A JSON file may extend any of them and replace some of its records."""
 
 import hashlib
+import math
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -11,18 +12,21 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from nlp_gait.decoding import decode, read_dataclass
 from nlp_gait.errors import RobotDataError, UnknownNameError, format_value, unknown, warn_once
 from nlp_gait.files import check_path, convert_errors
-from nlp_gait.robots.inference import EXTENTS, SIDES, Feet, Side, find_legs, infer_feet
-from nlp_gait.robots.packages import MARK, MODEL_ENDINGS, find_robot_file
+from nlp_gait.robots.inference import EXTENTS, SIDES, Feet, Legs, Side, check_sizes, find_legs, find_middle, infer_feet
+from nlp_gait.robots.packages import MARK, MODEL_ENDINGS, find_kind, find_robot_file
 from nlp_gait.robots.perturbation import perturb, split_name
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, check_robot_name, make_unit_axis
-from nlp_gait.robots.tree import check_inertias, move_root, reverse_joint, shift_to_com
+from nlp_gait.robots.tree import check_inertias, move_along_axis, move_root, reverse_joint, shift_to_com
 from nlp_gait.robots.welding import Joints, Links, RobotParts, find_faults, weld_faults
 
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
 LONGEST_CHAIN = 8  # of robots that extend each other
+NEGLIGIBLE_M = 1e-6  # published origins are rounded to this
 MOST_JOINTS = 400  # among which legs are searched, which takes 2 s then, and eight times as long for twice as many
 # Fields that replace those of the extended file.
 REPLACED = ("name", "description", "root", "forward", "heat_loss_W_per_Nm2")
@@ -79,7 +83,7 @@ def list_robots() -> tuple[str, ...]:
 
 
 def load_robot(name_or_path: str) -> Robot:
-    """Load a robot by its name, or from a file: a path that ends in ``.json``, ``.urdf`` or, for MJCF, ``.xml``.
+    """Load a robot by its name, or from a file: a path that ends in ``.json``, or one of a URDF or MJCF, known by its first tag.
 
     A file of an installed package is named ``PACKAGE:NAME``, see ``robots/packages.py``.
 
@@ -114,7 +118,7 @@ def hold_robots() -> Iterator[None]:
 def is_robot_file(name_or_path: str) -> bool:
     """Return whether a robot comes from a file, its user's or an installed package's, instead of this package."""
     source = split_name(name_or_path)[0]
-    return source.endswith(FILE_ENDINGS) or MARK in source
+    return source.lower().endswith(FILE_ENDINGS) or MARK in source
 
 
 def hash_robot(name_or_path: object) -> str:
@@ -130,12 +134,12 @@ def list_robot_files(name_or_path: str) -> set[str]:
     while source.endswith(".json") and source not in files:
         files.add(source)
         source = _resolve(_read(source).extends or "", source)
-    if source.endswith(MODEL_ENDINGS):
+    if _is_model(source):
         from nlp_gait.robots.mjcf import list_dependencies
         from nlp_gait.robots.urdf import list_meshes
 
         with convert_errors(f"robot file {source!r}", RobotDataError):
-            files |= {source, *(list_dependencies(source) if source.endswith(".xml") else list_meshes(source))}
+            files |= {source, *(list_dependencies if find_kind(Path(source)) == "mjcf" else list_meshes)(source)}
     return {os.path.abspath(file) for file in files}
 
 
@@ -148,10 +152,14 @@ def _load(name_or_path: str) -> Robot:
 _load_shipped = cache(_load)
 
 
+def _is_model(source: str) -> bool:
+    return source.lower().endswith(MODEL_ENDINGS)
+
+
 def _find_description(source: str) -> str:
     """Return the file to read first: for a URDF or MJCF the robot file of the same name, if there is one."""
     path = find_robot_file(source)
-    if not path.endswith(MODEL_ENDINGS):
+    if not _is_model(path):
         return path
     partner = Path(path).with_suffix(".json")
     if not os.path.isfile(partner):
@@ -164,7 +172,7 @@ def _find_description(source: str) -> str:
 
 def _describe(source: str, extending: tuple[str, ...] = ()) -> RobotDescription:
     """Return what a file, and the files that it extends, say about a robot."""
-    if source.endswith(MODEL_ENDINGS):
+    if _is_model(source):
         return _read_model(source, None)
     file = _read(source)
     description = _decode_parts(file, source)
@@ -173,7 +181,7 @@ def _describe(source: str, extending: tuple[str, ...] = ()) -> RobotDescription:
     base_source = _resolve(file.extends, source)
     if base_source in extending or len(extending) >= LONGEST_CHAIN:
         raise RobotDataError(f"robot {source!r}: 'extends' must name another robot, got {file.extends!r}")
-    if base_source.endswith(MODEL_ENDINGS):
+    if _is_model(base_source):
         base = _read_model(base_source, file.inertia_about)
     else:
         base = _describe(base_source, (*extending, source))
@@ -198,7 +206,7 @@ def _read_model(source: str, inertia_about: str | None) -> RobotDescription:
     from nlp_gait.robots.urdf import read_urdf
 
     with convert_errors(f"robot file {source!r}", RobotDataError):
-        if source.endswith(".xml"):
+        if find_kind(Path(source)) == "mjcf":
             model = read_mjcf(source)
         else:
             model = read_urdf(source, about_joint=inertia_about == "joint")
@@ -243,7 +251,7 @@ def _rename(joints: Mapping[str, Joint], names: Mapping[str, str], source: str) 
 def _resolve(base: str, source: str) -> str:
     """Return the name or path of an extended robot; a path is relative to the file that names it."""
     # Normalised, to recognise two files that extend each other by different paths.
-    return os.path.normpath(Path(source).parent / base) if base.endswith(FILE_ENDINGS) else base
+    return os.path.normpath(Path(source).parent / base) if base.lower().endswith(FILE_ENDINGS) else base
 
 
 def _read(name_or_path: str) -> RobotFile:
@@ -281,6 +289,7 @@ def _make_robot(description: RobotDescription, source: str) -> Robot:
         feet=soles,
         posture_rad=file.posture_rad,
         heat_loss_W_per_Nm2=file.heat_loss_W_per_Nm2,
+        unusable={} if description.model is None else description.model.unusable,
         notes=tuple(notes),
     )
 
@@ -296,15 +305,49 @@ def _complete(
         if foot.get("link") not in links:
             foot["link"] = model.carriers.get(str(foot.get("link")), foot.get("link"))
     legs = find_legs(name, links, joints, feet)
+    notes += model.notes
     weld_faults(links, joints, legs.links, notes)
-    ankle_m, hip_m = (float(legs.chains[0][k].place[2]) for k in (0, -1))
-    if hip_m > (hip_m - ankle_m) / 2:  # as of a root on the ground; gaits and falls refer to an origin near the hips
-        notes.append(f"the root's origin is {hip_m:.2f} m below the hips: it was moved up to them")
-        move_root(str(description.file.root), links, joints, hip_m)
+    check_sizes(name, links, joints, notes)
+    _note_limits(joints, legs, notes)
+    if all(legs.chains):
+        _move_frames(str(description.file.root), legs, links, joints, notes)
     if not all(set(EXTENTS) <= set(feet.get(side, ())) for side in SIDES):
         forward = description.file.forward
         feet = infer_feet(name, legs, links, joints, feet, model.read_shapes, forward, notes)
-    if count := sum("foot:" not in note for note in notes):
-        summary = f"{count} note{'s' * (count > 1)} on welded parts"
-        warn_once("robot %r: %s; see nlp-gait list --robot FILE", name, summary)
+    if listed := [
+        note for note in notes if not note.startswith(("left foot:", "right foot:", "no limit of speed: all"))
+    ]:
+        others = f" (and {len(listed) - 1} more)" if len(listed) > 1 else ""
+        warn_once("robot %r: %s%s; see nlp-gait list --robot FILE", name, listed[0], others)
     return feet
+
+
+def _note_limits(joints: Joints, legs: Legs, notes: list[str]) -> None:
+    """Note which joints of the legs have no limit, or a tighter one of software."""
+    moving = [joint for joint in joints.values() if joint.child in legs.links]
+    for quantity, limits in (
+        ("torque", [joint.torque_limit_Nm for joint in moving]),
+        ("speed", [joint.velocity_limit_rad_s for joint in moving]),
+    ):
+        free = [joint.name for joint, limit in zip(moving, limits, strict=True) if limit == math.inf]
+        if free:
+            listed = "all joints of the legs" if len(free) == len(moving) else ", ".join(free)
+            notes.append(f"no limit of {quantity}: {listed}")
+    if soft := [joint.name for joint in moving if joint.planning_limits_rad != joint.limits_rad]:
+        notes.append(f"soft limits, which are tighter, are used: {', '.join(soft)}")
+
+
+def _move_frames(root: str, legs: Legs, links: Links, joints: Joints, notes: list[str]) -> None:
+    """Move the frames of the feet to the ankles, and the root's to the plane of symmetry near the hips."""
+    for chain, ankle in zip(legs.chains, legs.ankles_m, strict=True):
+        offset = ankle - chain[0].place
+        if np.linalg.norm(offset) > NEGLIGIBLE_M:
+            move_along_axis(links, joints, chain[0].joint.name, offset)
+    offset = find_middle(legs)
+    if (aside := float(np.linalg.norm(offset))) > NEGLIGIBLE_M:
+        notes.append(f"the root's origin is {1e3 * aside:.1f} mm from the plane of symmetry: it was moved into it")
+    hip, ankle = legs.hip_m[2], legs.ankles_m[0][2]
+    if hip > (hip - ankle) / 2:  # as of a root on the ground; gaits and falls refer to an origin near the hips
+        notes.append(f"the root's origin is {hip:.2f} m below the hips: it was moved up to them")
+        offset[2] = hip
+    move_root(root, links, joints, offset)

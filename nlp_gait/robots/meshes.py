@@ -20,7 +20,8 @@ from nlp_gait.processes import has_fork, run_alone
 from nlp_gait.robots.robot import are_plausible
 from nlp_gait.robots.tree import Array, rotate
 
-PACKAGE = "package://"
+PACKAGES = ("package://", "model://")  # where a path begins with the name of a package or, in Gazebo, of a model
+POINTER = b"version https://git-lfs"  # first bytes of a file whose content Git LFS has not fetched
 FOLDER_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 STL_HEADER, STL_TRIANGLE = 84, 50  # bytes
 DEEPEST_NODE = 32  # of a Collada scene
@@ -30,13 +31,13 @@ RIM = 24  # points of a cylinder's edge
 
 
 def find_mesh(address: str, robot_file: Path) -> Path | None:
-    """Find the file of a mesh; ``package://`` is searched for above the robot's file and in the folders of ROS."""
+    """Find the file of a mesh; ``package://`` and ``model://`` are searched for above the robot's file and in ROS's folders."""
     if "\0" in address:
         return None
-    if not address.startswith(PACKAGE):
+    if not address.startswith(PACKAGES):
         file = robot_file.parent / address.removeprefix("file://")
         return file if os.path.isfile(file) else None
-    path = Path(address.removeprefix(PACKAGE).lstrip("/"))
+    path = Path(address.partition("://")[2].lstrip("/"))
     if ".." in path.parts or not path.parts:
         return None
     listed = [
@@ -61,9 +62,17 @@ def parse_xml(data: bytes) -> Any:
     """Return the root element; entities stay unresolved, and nothing else is read. Raises ValueError."""
     etree = import_module("lxml.etree")
     try:
-        return etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True))
+        parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
+        return etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
         raise ValueError(" ".join(str(error).split())) from error
+
+
+def remove_namespace(root: Any) -> None:
+    """Take the root's namespace out of the names of all elements."""
+    namespace = root.tag.rpartition("}")[0] + "}"
+    for element in root.iter("*"):  # not entities
+        element.tag = element.tag.removeprefix(namespace)
 
 
 def make_pose(place: Sequence[float] | Array, roll_pitch_yaw: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
@@ -108,6 +117,7 @@ def read_mesh_points(path: Path) -> Array:
 
 def _read_points(path: Path) -> Array:
     data = read_bytes(path, "mesh", error=RobotDataError)
+    check_pointer(path, data)
     readers: dict[str, Callable[[bytes], Array]] = {
         ".stl": _read_stl,
         ".obj": partial(_read_lines, "v", "utf-8"),
@@ -123,6 +133,12 @@ def _read_points(path: Path) -> Array:
     if not len(points) or not are_plausible(points):
         raise RobotDataError(f"mesh {str(path)!r} has no points, or points that are not finite")
     return points
+
+
+def check_pointer(path: Path, data: bytes) -> None:
+    """Raise RobotDataError for a pointer of Git LFS in place of the content."""
+    if data.startswith(POINTER):
+        raise RobotDataError(f"file {str(path)!r} is a Git LFS pointer, not its content; run: git lfs pull")
 
 
 def _read_stl(data: bytes) -> Array:
@@ -143,15 +159,10 @@ def _read_lines(first: str, encoding: str, data: bytes) -> Array:
 
 def _read_collada(data: bytes) -> Array:
     root = parse_xml(data)
-    for element in root.iter():  # names without the namespace
-        element.tag = element.tag.rpartition("}")[2]
+    remove_namespace(root)
     geometries = {f"#{geometry.get('id')}": _read_positions(geometry) for geometry in root.iter("geometry")}
     unit = root.find("asset/unit")
     scale = float(unit.get("meter", "1")) if unit is not None else 1.0
-    up = root.findtext("asset/up_axis", "Y_UP").strip()
-    upright = {"Z_UP": np.eye(3), "Y_UP": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])}.get(up)
-    if upright is None:
-        raise ValueError(f"up_axis {up!r} is not supported")
     scene = root.find("library_visual_scenes/visual_scene")
     placed: list[Array] = []
     total = 0
@@ -174,8 +185,8 @@ def _read_collada(data: bytes) -> Array:
 
     if scene is not None:
         visit(scene, np.eye(4), 0)
-    points = np.concatenate(placed or list(geometries.values()))
-    return np.asarray(scale * points @ upright.T)
+    # ``up_axis`` is ignored, as RViz, Gazebo classic, MoveIt and Pinocchio do.
+    return np.asarray(scale * np.concatenate(placed or list(geometries.values())))
 
 
 def _read_positions(geometry: Any) -> Array:

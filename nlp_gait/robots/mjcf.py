@@ -3,6 +3,7 @@
 import json
 import logging
 import math
+import re
 from collections.abc import Mapping
 from functools import partial
 from importlib import import_module
@@ -12,16 +13,22 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
+from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import protect_input
-from nlp_gait.robots.meshes import list_shape_points, move_points, read_in_child, read_model
+from nlp_gait.robots.meshes import (
+    POINTER,
+    check_pointer,
+    list_shape_points,
+    move_points,
+    read_in_child,
+    read_model,
+)
 from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
 LOG = logging.getLogger("nlp_gait")
-UNLIMITED_RAD_S = 1000.0  # MJCF has no speed limits
-IGNORED = {"armature": "kg m^2", "damping": "Nm s/rad", "frictionloss": "Nm"}  # of a joint
+JOINT_HINGE, JOINT_TRANSMISSIONS = 3, (0, 1)  # mjJNT_HINGE; mjTRN_JOINT and mjTRN_JOINTINPARENT
 
 
 def read_mjcf(path: str) -> RobotParts:
@@ -32,13 +39,13 @@ def read_mjcf(path: str) -> RobotParts:
     if that cannot read the file, or ValueError if it contains no robot, or a body with several hinges.
     """
     model = _compile(path)
-    poses = _place_bodies(model)
-    _report_ignored(path, model)
+    notes: list[str] = []
+    poses = _place_bodies(model, notes)
     names = {i: model.body(i).name or f"body {i}" for i in poses}
     if len(set(names.values())) < len(names):
         raise ValueError("two bodies have the same name")
     root = min(poses)
-    frames, turning = {}, []
+    frames, turning, hinges = {}, [], dict[str, int]()
     for i, pose in poses.items():
         hinge = None if i == root else _find_hinge(model, i)
         parent = None if i == root else names[int(model.body_parentid[i])]
@@ -46,12 +53,28 @@ def read_mjcf(path: str) -> RobotParts:
         frames[names[i]] = LinkFrame(parent, hinge is not None, origin, _read_mass(model, i, pose))
         if hinge is not None:
             turning.append(_read_turning(model, hinge, str(parent), names[i], pose))
+            hinges[names[i]] = hinge
+    carriers = list_carriers(frames)
+    unusable = {
+        model.joint(hinge).name: "has no actuator: it is not driven, and closed chains are not supported; add its motor"
+        for hinge in hinges.values()
+        if model.nu and not model.jnt_actfrclimited[hinge] and hinge not in _list_driven(model)
+    }
+    for equality in range(model.neq):
+        kind = _name(model, "mjtEq", "mjEQ_", model.eq_type[equality])
+        for body in _list_coupled_bodies(model, equality, kind):
+            if (hinge := hinges.get(carriers.get(names.get(body, ""), ""))) is not None:
+                unusable[model.joint(hinge).name] = (
+                    f"is coupled by the equality {kind!r}: closed chains are not supported"
+                )
+    notes += _list_ignored(model)
     read_shapes = partial(_read_foot_shapes, model, poses, names, frames)
-    return join_frames(Path(path).stem, frames, turning, read_shapes)
+    return join_frames(Path(path).stem, frames, turning, read_shapes, notes, unusable)
 
 
 def _read_turning(model: Any, hinge: int, parent: str, child: str, pose: Array) -> Joint:
     low, high = model.jnt_range[hinge] - model.qpos0[model.jnt_qposadr[hinge]]
+    rate = model.jnt_dofadr[hinge]
     return Joint(
         name=model.joint(hinge).name or f"joint {hinge}",
         parent=parent,
@@ -59,17 +82,43 @@ def _read_turning(model: Any, hinge: int, parent: str, child: str, pose: Array) 
         origin_m=(0.0, 0.0, 0.0),  # ``join_frames`` places it
         axis=make_unit_axis(to_vector(pose[:3, :3] @ model.jnt_axis[hinge])),
         limits_rad=(float(low), float(high)) if model.jnt_limited[hinge] else (-math.pi, math.pi),
-        velocity_limit_rad_s=UNLIMITED_RAD_S,
         torque_limit_Nm=_find_torque_limit(model, hinge),
+        armature_kgm2=float(model.dof_armature[rate]),
+        damping_Nms_rad=float(np.ravel(model.dof_damping[rate])[0]),
+        friction_Nm=float(model.dof_frictionloss[rate]),
     )
 
 
-def _report_ignored(path: str, model: Any) -> None:
-    hinges = model.jnt_dofadr[model.jnt_type == int(import_module("mujoco").mjtJoint.mjJNT_HINGE)]
-    values = {name: float(np.max(getattr(model, f"dof_{name}")[hinges], initial=0.0)) for name in IGNORED}
-    listed = ", ".join(f"{name} up to {values[name]:.3g} {unit}" for name, unit in IGNORED.items() if values[name])
-    if listed:
-        warn_once("robot file %r: its joints' %s; neither the model nor the simulation contains it", path, listed)
+def _name(model: Any, kind: str, prefix: str, number: int) -> str:
+    return str(getattr(import_module("mujoco"), kind)(int(number)).name.removeprefix(prefix).lower())
+
+
+def _list_driven(model: Any) -> set[int]:
+    """Return the joints of all actuators."""
+    return {
+        int(model.actuator_trnid[k, 0]) for k in range(model.nu) if model.actuator_trntype[k] in JOINT_TRANSMISSIONS
+    }
+
+
+def _list_coupled_bodies(model: Any, equality: int, kind: str) -> list[int]:
+    """Return the bodies that an equality couples, behind the joints of one of joints."""
+    numbers = [int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])]
+    of_object = {"joint": model.jnt_bodyid, "site": model.site_bodyid, "body": range(model.nbody)}
+    coupled = kind if kind == "joint" else _name(model, "mjtObj", "mjOBJ_", model.eq_objtype[equality])
+    return [int(of_object[coupled][number]) for number in numbers if coupled in of_object and number >= 0]
+
+
+def _list_ignored(model: Any) -> list[str]:
+    """Return a note on what changes the motion in MuJoCo and is not read; none without any."""
+    springs = [model.joint(j).name for j in range(model.njnt) if np.ravel(model.jnt_stiffness[j])[0]]
+    floating = [model.body(i).name for i in range(model.nbody) if model.body_gravcomp[i]]
+    parts = [
+        *([f"stiffness of {', '.join(springs)}"] if springs else []),
+        *([f"gravcomp of {', '.join(floating)}"] if floating else []),
+        *([f"{model.neq} equalities"] if model.neq else []),
+        *([f"{model.ntendon} tendons"] if model.ntendon else []),
+    ]
+    return [f"ignored: {', '.join(parts)}"] if parts else []
 
 
 def _read_foot_shapes(
@@ -78,13 +127,16 @@ def _read_foot_shapes(
     """Return the points of all shapes that move with a link, as for a URDF; MuJoCo has read the meshes."""
     carriers = list_carriers(frames)
     points = {kind: [np.zeros((0, 3))] for kind in ("collision", "visual")}
+    others = []
     for i in (i for i in poses if carriers[names[i]] == foot):
         for geom in range(model.body_geomadr[i], model.body_geomadr[i] + model.body_geomnum[i]):
             kind = "collision" if model.geom_contype[geom] or model.geom_conaffinity[geom] else "visual"
             pose = poses[i] @ _make_pose(model.geom_pos[geom], model.geom_quat[geom])
-            points[kind].append(_list_shape_points(model, geom, pose) - frames[foot].origin_m)
+            shape, listed = _list_shape_points(model, geom, pose)
+            points[kind].append(listed - frames[foot].origin_m)
+            others += [] if len(listed) else [shape]
     kind = "collision" if len(points["collision"]) > 1 else "visual"
-    return FootShapes(np.concatenate(points[kind]), kind)
+    return FootShapes(np.concatenate(points[kind]), kind, (), tuple(others))
 
 
 def list_dependencies(path: str) -> list[str]:
@@ -132,6 +184,9 @@ def _compile_binary(mujoco: Any, path: str) -> bytes:
     except Exception as error:  # ValueError, and any error of a plugin or decoder
         if "unknown exception" in str(error):  # of C++: no memory
             raise MemoryError from error
+        for name in re.findall(r"'([^'*?\[]+)'", str(error)):
+            for file in filter(Path.is_file, Path(path).parent.rglob(Path(name).name)):
+                check_pointer(file, file.open("rb").read(len(POINTER)))
         raise _convert(path, error) from error
     finally:
         mujoco.set_mju_user_warning(earlier)
@@ -144,12 +199,21 @@ def _convert(path: str, error: Exception) -> RobotDataError:
     return RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}{remedy}")
 
 
-def _place_bodies(model: Any) -> dict[int, Array]:
-    """Return the poses (4, 4) of the bodies of the heaviest tree in the frame of its root, which is the first one."""
-    tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
+def _place_bodies(model: Any, notes: list[str]) -> dict[int, Array]:
+    """Return the poses (4, 4) of the bodies of the heaviest tree with hinges in the frame of its root, which is the first one."""
+    tops = {i: float(model.body_subtreemass[i]) for i in range(1, model.nbody) if model.body_parentid[i] == 0}
     if not tops:
         raise ValueError("it contains no body")
-    root = max(tops, key=lambda i: float(model.body_subtreemass[i]))
+    turning = set(model.body_rootid[model.jnt_bodyid[model.jnt_type == JOINT_HINGE]].tolist())
+    root = max(tops, key=lambda i: (i in turning, tops[i]))
+    hinges = {i: int(np.sum(model.body_rootid[model.jnt_bodyid[model.jnt_type == JOINT_HINGE]] == i)) for i in tops}
+    if twins := [model.body(i).name for i in tops if i != root and hinges[i] == hinges[root] > 0]:
+        raise ValueError(
+            f"bodies {model.body(root).name!r} and {twins[0]!r} hang from the world with {hinges[root]} hinges each: join them "
+            'by a body, which MuJoCo keeps with fusestatic="false", or remove one'
+        )
+    if others := [f"{model.body(i).name!r} ({tops[i]:.3g} kg)" for i in tops if i != root]:
+        notes.append(f"read: the tree of {model.body(root).name!r} ({tops[root]:.3g} kg); ignored: {', '.join(others)}")
     poses: dict[int, Array] = {root: np.eye(4)}
     for i in range(root + 1, model.nbody):
         if (parent := int(model.body_parentid[i])) in poses:
@@ -160,8 +224,7 @@ def _place_bodies(model: Any) -> dict[int, Array]:
 def _find_hinge(model: Any, body: int) -> int | None:
     """Return the hinge that carries a body, None without one; raises ValueError for several."""
     first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-    hinge = int(import_module("mujoco").mjtJoint.mjJNT_HINGE)
-    hinges = [j for j in range(first, first + count) if model.jnt_type[j] == hinge]
+    hinges = [j for j in range(first, first + count) if model.jnt_type[j] == JOINT_HINGE]
     if len(hinges) > 1:
         name = model.body(body).name
         raise ValueError(f"body {name!r} has {len(hinges)} hinges; give each its own body with a small mass")
@@ -175,29 +238,33 @@ def _read_mass(model: Any, body: int, frame: Array) -> Mass:
 
 
 def _find_torque_limit(model: Any, joint: int) -> float:
-    """Return the limit of the joint, or else of its actuator [Nm]; 0 if neither has one."""
-    if model.jnt_actfrclimited[joint]:
-        return float(np.abs(model.jnt_actfrcrange[joint]).max())
+    """Return the smaller limit of a joint and of all its actuators together [Nm]; infinite without one."""
+    ranges = [model.jnt_actfrcrange[joint]] if model.jnt_actfrclimited[joint] else []
+    motors = []
     for k in range(model.nu):
-        if model.actuator_trnid[k, 0] == joint and model.actuator_trntype[k] == 0:
-            gear = abs(float(model.actuator_gear[k, 0]))
+        if model.actuator_trnid[k, 0] == joint and model.actuator_trntype[k] in JOINT_TRANSMISSIONS:
+            gear, gain = abs(float(model.actuator_gear[k, 0])), abs(float(model.actuator_gainprm[k, 0]))
+            motor = np.array([-math.inf, math.inf])
             if model.actuator_forcelimited[k]:
-                return gear * float(np.abs(model.actuator_forcerange[k]).max())
-            if model.actuator_ctrllimited[k] and not model.actuator_biasprm[k].any():  # a motor, not a position drive
-                gain = abs(float(model.actuator_gainprm[k, 0]))
-                return gear * gain * float(np.abs(model.actuator_ctrlrange[k]).max())
-    return 0.0
+                motor = gear * model.actuator_forcerange[k]
+            elif model.actuator_ctrllimited[k] and not model.actuator_biasprm[k].any():  # a motor, not a position drive
+                motor = gear * gain * model.actuator_ctrlrange[k]
+            motors.append(motor)
+    if motors:
+        ranges.append(np.sum(motors, axis=0))
+    return float(np.min(np.abs(ranges), initial=math.inf))
 
 
-def _list_shape_points(model: Any, geom: int, pose: Array) -> Array:
-    kind = import_module("mujoco").mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
+def _list_shape_points(model: Any, geom: int, pose: Array) -> tuple[str, Array]:
+    """Return the kind of a shape and its points (N, 3)."""
+    kind = _name(model, "mjtGeom", "mjGEOM_", model.geom_type[geom])
     if kind == "mesh":
         mesh = int(model.geom_dataid[geom])
         first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
         points = move_points(np.array(model.mesh_vert[first : first + count], dtype=float), pose)
     else:
         points = list_shape_points(kind, model.geom_size[geom], pose)
-    return points if are_plausible(points) else np.zeros((0, 3))
+    return kind, points if are_plausible(points) else np.zeros((0, 3))
 
 
 def _make_pose(place: Array, quaternion: Array) -> Array:

@@ -3,6 +3,7 @@
 import difflib
 import os
 import pkgutil
+import re
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -14,9 +15,11 @@ from typing import Any
 from nlp_gait.errors import RobotDataError, unknown
 
 MARK = ":"  # between an installed package and one of its robots
-MODEL_ENDINGS = (".urdf", ".xml")
+MODEL_ENDINGS = (".urdf", ".xml", ".mjcf", ".xacro")
 DESCRIPTION = "_description"  # end of the names of the modules of robot_descriptions
-HEAD_BYTES = 4096  # of an XML file, within which MJCF has its first tag
+HEAD_BYTES = 65536  # of an XML file, within which its first tag is
+FIRST_TAG = re.compile(rb"(?:<\?.*?\?>|<!--.*?-->|<!.*?>|[^<])*<(?:\w+:)?(\w+)", re.DOTALL)
+KINDS = {"robot": "urdf", "mujoco": "mjcf"}  # of files by their first tag
 
 Locate = Callable[[], str]  # returns the path of a robot's file
 
@@ -27,7 +30,7 @@ def find_robot_file(name: str) -> str:
     A file is named without its ending or, if files share a name, by its folder, or else by both. Raises UnknownNameError with
     the nearest names; RobotDataError for a package that is not installed, or does not provide the file.
     """
-    if name.endswith((".json", *MODEL_ENDINGS)) or MARK not in name:
+    if name.lower().endswith((".json", *MODEL_ENDINGS)) or MARK not in name:
         return name
     package, _, robot = name.partition(MARK)
     if not (package and robot):
@@ -54,8 +57,9 @@ def find_robot_file(name: str) -> str:
 
 def _list_files(package: str) -> Mapping[str, Locate]:
     """Return the URDF and MJCF files of a package by name, without scenes, which contain a robot's file."""
-    paths = [Path(str(file.locate())) for file in distribution(package).files or () if file.suffix in MODEL_ENDINGS]
-    models = [path for path in paths if not path.stem.startswith("scene") and _is_robot(path)]
+    files = [file for file in distribution(package).files or () if file.suffix in MODEL_ENDINGS]
+    paths = [Path(str(file.locate())) for file in files]
+    models = [path for path in paths if not path.stem.startswith("scene") and find_kind(path)]
     named: dict[str, Locate] = {}
     for form in ("{file}", "{folder}", "{folder}/{file}", "{path}"):
         names = {path: form.format(file=path.stem, folder=path.parent.name, path=path) for path in models}
@@ -65,14 +69,14 @@ def _list_files(package: str) -> Mapping[str, Locate]:
     return named
 
 
-def _is_robot(path: Path) -> bool:
-    if path.suffix == ".urdf":
-        return True
+def find_kind(path: Path) -> str:
+    """Return the kind of a robot's file, ``urdf`` or ``mjcf``, by its first tag; "" for another tag, or if it is not read."""
     try:
         with path.open("rb") as file:
-            return b"<mujoco" in file.read(HEAD_BYTES)
+            tag = FIRST_TAG.match(file.read(HEAD_BYTES))
     except OSError:
-        return False
+        return ""
+    return KINDS.get(tag[1].decode(), "") if tag else ""
 
 
 def _list_menagerie(package: str) -> Mapping[str, Locate]:

@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from nlp_gait.errors import InputError, unknown
+from nlp_gait.robots.packages import MODEL_ENDINGS
 from nlp_gait.robots.robot import Foot, Robot
 
 MARK = "@"
@@ -50,7 +51,7 @@ def name_perturbed(name: str, changes: Mapping[str, float]) -> str:
 def split_name(text: str) -> tuple[str, dict[str, float]]:
     """Split a robot's name and its changes; raises InputError if the text after the mark is not a list of changes."""
     name, mark, listed = text.rpartition(MARK)
-    if not mark or listed.endswith((".json", ".urdf", ".xml")):  # the mark may be part of a file's path
+    if not mark or listed.lower().endswith((".json", *MODEL_ENDINGS)):  # the mark may be part of a file's path
         return text, {}
     changes: dict[str, float] = {}
     for item in listed.split(","):

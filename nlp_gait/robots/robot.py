@@ -23,10 +23,15 @@ def check_robot_name(name: str, where: str) -> None:
         raise ValueError(f"{where}: a name has 1 to {LONGEST_NAME} printable characters, got {name[:LONGEST_NAME]!r}")
 
 
-def check_numbers(owner: str, record: Any, positive: Collection[str]) -> None:
-    """Raise RobotDataError for a number of a dataclass that is not finite, not within ``LARGEST_NUMBER``, or not positive."""
+def check_numbers(owner: str, record: Any, positive: Collection[str], infinite: Collection[str] = ()) -> None:
+    """Raise RobotDataError for a number of a dataclass that is not finite, not within ``LARGEST_NUMBER``, or not positive.
+
+    Those in ``infinite`` may be infinite.
+    """
     for item in fields(record):
         value = getattr(record, item.name)
+        if item.name in infinite and value == math.inf:
+            continue
         if item.name in positive and not value > 0.0:  # NaN fails too
             raise RobotDataError(f"{owner}: {item.name} must be > 0, got {value}")
         if isinstance(value, (int, float, tuple)) and not are_plausible(value):
@@ -127,6 +132,9 @@ class Motor:
         return self.no_load_rad_s / self.stall_torque_Nm
 
 
+POSITIVE_LIMITS = ("velocity_limit_rad_s", "torque_limit_Nm", "nominal_torque_Nm")  # of a joint
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
     """Revolute joint; at q = 0 the child frame is at its origin with the parent's axes. A file's may be faulty, as a link."""
@@ -139,8 +147,13 @@ class Joint:
     limits_rad: tuple[float, float]  #: (lower, upper) mechanical limits [rad]
     #: (lower, upper) limits of planned gaits [rad]; by default the mechanical ones
     planning_limits_rad: tuple[float, float] = ()  # type: ignore[assignment]
-    velocity_limit_rad_s: float
-    torque_limit_Nm: float
+    velocity_limit_rad_s: float = math.inf  #: infinite: no limit
+    torque_limit_Nm: float = math.inf  #: infinite: no limit
+    armature_kgm2: float = 0.0  #: inertia of the rotor at the joint
+    damping_Nms_rad: float = 0.0  #: friction torque per rate
+    friction_Nm: float = 0.0  #: dry friction; in simulations only
+    #: torque by which drives of a joint without a limit are as stiff as those of one with this limit
+    nominal_torque_Nm: float = math.inf
     motor: Motor | None = None
 
     def __post_init__(self) -> None:
@@ -150,7 +163,10 @@ class Joint:
     def check(self) -> None:
         """Raise RobotDataError for an axis that is no unit vector, or limits that are not allowed."""
         owner = f"joint {self.name!r}"
-        check_numbers(owner, self, positive=("velocity_limit_rad_s", "torque_limit_Nm"))
+        check_numbers(owner, self, POSITIVE_LIMITS, POSITIVE_LIMITS)
+        for name in ("armature_kgm2", "damping_Nms_rad", "friction_Nm"):
+            if getattr(self, name) < 0.0:
+                raise RobotDataError(f"{owner}: {name} must be >= 0, got {getattr(self, name)}")
         if abs(math.hypot(*self.axis) - 1.0) > 1e-9:
             raise RobotDataError(f"{owner}: axis must be a unit vector, got {self.axis}")
         for name, (low, high) in (("limits_rad", self.limits_rad), ("planning_limits_rad", self.planning_limits_rad)):
@@ -192,11 +208,11 @@ class Robot:
     feet: Mapping[str, Foot]  #: ``"left"`` and ``"right"``
     #: soles beyond a toe joint, by side; the frame of a toe's link is at that joint
     toes: Mapping[str, Foot] = field(default_factory=dict)
-    #: by joint, inertia of rotors at the joint, if the dynamics include it; none by default
-    armatures_kgm2: Mapping[str, float] = field(default_factory=dict)
     #: angles of joints that a gait does not move; by default zero, or the nearest limit
     posture_rad: Mapping[str, float] = field(default_factory=dict)
     heat_loss_W_per_Nm2: float | None = None  #: heat of the motors per squared torque, if the robot's file states it
+    #: joints that the legs of a humanoid cannot have, such as coupled ones, and why, in words
+    unusable: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()  #: what was inferred or changed when the robot was read; a sentence each
 
     def __post_init__(self) -> None:

@@ -110,7 +110,8 @@ def shift_to_com(link: Link) -> Link:
     return replace(link, inertia_com_kgm2=list_moments(about_com))
 
 
-MIRROR_M, MIRROR_COSINE = 2e-3, 0.999  # mirrored places agree to this, and mirrored axes to this cosine
+MIRROR_M, MIRROR_COSINE = 2e-3, 0.999  # mirrored axes and places agree to this, and directions to this cosine
+LEAST_SINE = 0.1  # least sine of the angle between axes that must not be parallel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +124,6 @@ class TreeBody:
     direction: int  # +1 if the joint's child link is this body's, else -1
     offset_m: Vector  # from the parent's reference point to this one, in the parent's axes [m]
     com_offset_m: Vector  # from the reference point to the centre of mass, in link axes [m]
-    armature_kgm2: float = 0.0  # inertia of the rotor at the joint, if the robot's dynamics include it [kg m^2]
 
 
 def make_tree(robot: Robot, fixed_link: str, joints: Collection[str] | None = None) -> tuple[TreeBody, ...]:
@@ -153,7 +153,6 @@ def make_tree(robot: Robot, fixed_link: str, joints: Collection[str] | None = No
             direction=1 if forward else -1,
             offset_m=to_vector(np.subtract(centre_in_parent, parent_reference)),
             com_offset_m=to_vector(np.subtract(link.com_m, reference)),
-            armature_kgm2=0.0 if joint is None else robot.armatures_kgm2.get(joint.name, 0.0),
         )
         bodies.append(body)
         index = len(bodies) - 1
@@ -189,13 +188,19 @@ def turn_parts(links: dict[str, Link], joints: dict[str, Joint], rotation: Array
         joints[name] = replace(joint, origin_m=origin, axis=axis)
 
 
-def move_root(root: str, links: dict[str, Link], joints: dict[str, Joint], height_m: float) -> None:
-    """Move the origin of the root up; its body and its joints stay where they are."""
-    offset = np.array([0.0, 0.0, height_m])
+def move_root(root: str, links: dict[str, Link], joints: dict[str, Joint], offset: Array) -> None:
+    """Move the origin of the root by an offset (3,) [m]; its body and its joints stay where they are."""
     links[root] = replace(links[root], com_m=to_vector(links[root].com_m - offset))
     for name, joint in joints.items():
         if joint.parent == root:
             joints[name] = replace(joint, origin_m=to_vector(joint.origin_m - offset))
+
+
+def move_along_axis(links: dict[str, Link], joints: dict[str, Joint], name: str, offset: Array) -> None:
+    """Move the origin of a joint, and with it its child's frame, along its axis by an offset (3,) [m]; no body moves."""
+    joint = joints[name]
+    joints[name] = replace(joint, origin_m=to_vector(joint.origin_m + offset))
+    move_root(joint.child, links, joints, offset)
 
 
 def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:
@@ -262,7 +267,7 @@ def find_partner(name: str) -> str:
 
 
 def find_partners(robot: Robot) -> Mapping[str, str]:
-    """Return the mirror image of every joint by its place at zero angles, because names mislead; else by its name."""
+    """Return the mirror image of every joint: of the legs by order, of others by place, because names mislead; else by name."""
     places = {
         name: np.sum([above.origin_m for above in robot.path_to_root(joint.child)], axis=0)
         for name, joint in robot.joints.items()
@@ -270,23 +275,37 @@ def find_partners(robot: Robot) -> Mapping[str, str]:
     axes = {name: np.array(joint.axis) for name, joint in robot.joints.items()}
 
     def image(name: str) -> str:
-        named = find_partner(name)
-        fitting = [o for o in places if are_mirror_images(places[name], axes[name], places[o], axes[o])]
+        named, mirrored = find_partner(name), MIRROR * places[name]
+        fitting = [
+            other
+            for other, place in places.items()
+            if math.dist(mirrored, place) <= MIRROR_M and abs(MIRROR * axes[name] @ axes[other]) >= MIRROR_COSINE
+        ]
         if named in fitting or not fitting:
             return named if named in places else name
         return fitting[0]
 
-    return {name: image(name) for name in places}
+    left, right = ([joint.name for joint in robot.path_to_root(robot.feet[side].link)] for side in ("left", "right"))
+    legs = dict([*zip(left, right, strict=False), *zip(right, left, strict=False)])
+    return {name: legs[name] if name in legs else image(name) for name in places}
 
 
-def are_mirror_images(
-    place: np.ndarray, axis: np.ndarray, other_place: np.ndarray, other_axis: np.ndarray, across: int = 1
-) -> bool:
-    """Return whether two joints are mirror images in the plane through the root across an axis."""
-    image = np.ones(3)
-    image[across] = -1.0
-    near = math.dist(image * place, other_place) <= MIRROR_M
-    return near and abs(float((image * axis) @ other_axis)) >= MIRROR_COSINE
+MIRROR = np.array([1.0, -1.0, 1.0])  # in the plane y = 0
+
+
+def compare_axes(place: Array, axis: Array, other_place: Array, other_axis: Array) -> tuple[float, float]:
+    """Return how far two lines (3,) are apart, at the first one's place [m], and the angle between them [rad]."""
+    gap = np.linalg.norm(np.cross(other_place - place, other_axis))
+    return float(gap), math.acos(min(1.0, abs(float(axis @ other_axis))))
+
+
+def find_nearest_on_axis(place: Array, axis: Array, other_place: Array, other_axis: Array) -> Array:
+    """Return the point (3,) of a line that is nearest to another one; its given place if they are nearly parallel."""
+    normal = np.cross(axis, other_axis)
+    if np.linalg.norm(normal) < LEAST_SINE:
+        return place
+    along = np.linalg.det([other_place - place, other_axis, normal]) / (normal @ normal)
+    return np.asarray(place + along * axis)
 
 
 def mirror_sign(robot: Robot, joint: str, image: str) -> float:

@@ -1,6 +1,7 @@
 """URDF files as links and joints of a robot; what a gait does not need, such as transmissions and plugins, is not read."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from functools import partial
 from importlib.util import find_spec
@@ -9,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
+from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import protect_input
 from nlp_gait.robots.meshes import (
     find_mesh,
@@ -19,14 +20,16 @@ from nlp_gait.robots.meshes import (
     parse_xml,
     read_mesh_points,
     read_model,
+    remove_namespace,
 )
 from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, compute_point_inertia, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+LIMITS, DYNAMICS = ("effort", "velocity"), ("damping", "friction")
 OWNERS = ("robot", "link", "joint")
-# Attributes of the elements that are read.
+# Attributes of the elements that are read, and elements without influence on a gait; others are listed as ignored.
 ATTRIBUTES = {
     "robot": {"name", "version"},
     "link": {"name"},
@@ -38,12 +41,23 @@ ATTRIBUTES = {
     "parent": {"link"},
     "child": {"link"},
     "axis": {"xyz"},
-    "limit": {"lower", "upper", "effort", "velocity"},
+    "limit": {"lower", "upper", *LIMITS},
+    "dynamics": set(DYNAMICS),
+    "safety_controller": {"soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"},
 }
+WITHOUT_INFLUENCE = ("visual", "collision", "material")
 TURNING = ("revolute", "continuous")
 KINDS = (*TURNING, "prismatic", "floating", "planar", "fixed", "unknown")
 SHAPES = ("collision", "visual")
 WORLD = "world"
+XACRO = (
+    "}arg",
+    "}if",
+    "}include",
+    "}macro",
+    "}property",
+    "}unless",
+)  # ends of the names of elements that change others
 MOST_PARTS = 2000  # links and joints; the time to read them grows with the square
 
 
@@ -66,9 +80,17 @@ def read_urdf(path: str, *, about_joint: bool = False) -> RobotParts:
     for link, element in links.items():
         parent, turns = (joint_to[link].parent, joint_to[link].kind in TURNING) if link in joint_to else (None, False)
         frames[link] = LinkFrame(parent, turns, poses[link][:3, 3], _read_mass(element, poses[link], about_joint))
-    turning = [_read_turning(joint, poses[joint.child]) for joint in joints if joint.kind in TURNING]
+    notes, turning = _list_ignored(robot), [joint for joint in joints if joint.kind in TURNING]
+    unusable = {joint.name: fault for joint in turning if (fault := _find_unusable(joint))}
+    for key in LIMITS:
+        zero = [joint for joint in turning if _read_limit(joint, key) == 0.0]
+        if zero and len(zero) == len(turning):
+            notes.append(f"{key} of every joint is 0: it is taken as not stated")
+        else:
+            unusable |= {joint.name: f"has {key} 0 in its <limit>: {NOT_DRIVEN}" for joint in zero}
     read_shapes = partial(_read_foot_shapes, Path(path), links, poses, list_carriers(frames))
-    return join_frames(name, frames, turning, read_shapes)
+    read = [_read_turning(joint, poses[joint.child]) for joint in turning]
+    return join_frames(name, frames, read, read_shapes, notes, unusable)
 
 
 def _rename_world(robot: Any) -> None:
@@ -79,6 +101,11 @@ def _rename_world(robot: Any) -> None:
                 element.set(key, f"{WORLD}_link")
 
 
+NOT_DRIVEN = (
+    "it is not driven, and closed chains are not supported; if it is, write its limit, or remove it for no limit"
+)
+
+
 class UrdfJoint(NamedTuple):
     """A joint of any kind."""
 
@@ -87,6 +114,15 @@ class UrdfJoint(NamedTuple):
     kind: str
     parent: str
     child: str
+
+
+def _find_unusable(joint: UrdfJoint) -> str:
+    """Return why a joint cannot be part of a leg, in words, or ""."""
+    if joint.element.find("mimic") is not None:
+        return f"mimics joint {joint.element.find('mimic').get('joint')!r}: coupled joints are not supported; remove <mimic>"
+    if joint.kind == "revolute" and joint.element.find("limit") is None:
+        return "is revolute and has no <limit>; write one with lower and upper, or make it continuous"
+    return ""
 
 
 def list_meshes(path: str) -> list[str]:
@@ -105,7 +141,7 @@ def _read_foot_shapes(
     """
     moving = [name for name in links if carriers[name] == foot]
     kind = next((kind for kind in SHAPES if any(links[name].findall(kind) for name in moving)), SHAPES[0])
-    points, missing = [np.zeros((0, 3))], []
+    points, missing, others = [np.zeros((0, 3))], [], []
     for name in moving:
         for shape in links[name].findall(kind):
             pose = make_pose(-poses[foot][:3, 3]) @ poses[name] @ _read_pose(shape)
@@ -113,9 +149,11 @@ def _read_foot_shapes(
                 corners = _list_shape_points(geometry, pose, path)
                 if corners is None:
                     missing.append(str(geometry.get("filename")))
-                else:
+                elif len(corners):
                     points.append(corners)
-    return FootShapes(np.concatenate(points), kind, tuple(missing))
+                else:
+                    others.append(str(geometry.tag))
+    return FootShapes(np.concatenate(points), kind, tuple(missing), tuple(others))
 
 
 def _list_shape_points(shape: Any, pose: Array, path: Path) -> Array | None:
@@ -142,30 +180,35 @@ def _read_xml(path: str) -> Any:
     data = read_model(path)
     try:
         robot = parse_xml(data)
+        remove_namespace(robot)
     except ValueError as error:
         raise RobotDataError(f"robot file {path!r} is not valid XML: {error}") from error
     if robot.getroottree().docinfo.internalDTD is not None:  # a URDF has none; entities could read other files
         raise ValueError("a URDF must not have a DOCTYPE or entities; remove them")
+    if any("xacro}" in element.tag and element.tag.endswith(XACRO) for element in robot.iter("*")):
+        raise ValueError("it is a xacro file; expand it first: xacro FILE > ROBOT.urdf")
     if robot.tag != "robot":
         raise ValueError(f"it is not a URDF of a robot: it begins with <{robot.tag}>, not <robot>")
     elements = robot.findall("link") + robot.findall("joint")
     if len(elements) > MOST_PARTS:
         raise ValueError(f"it has {len(elements)} links and joints, more than {MOST_PARTS}; simplify the file")
-    for element in (robot, *elements):
-        _check_attributes(element, path)
     for mesh in filter(None, (find_mesh(element.get("filename", ""), Path(path)) for element in robot.iter("mesh"))):
         protect_input(mesh)
     return robot
 
 
-def _check_attributes(element: Any, path: str) -> None:
-    """Warn of an unknown attribute of a link or joint; refuse those of elements with numbers, which may be misspelt."""
-    if odd := set(element.attrib) - ATTRIBUTES[element.tag]:
-        text = f"unknown attribute {min(odd)!r} of {_name_owner(element)}"
-        warn_once("robot file %r: %s; it is ignored, and may be removed", path, text)
-    for child in (*element, *element.findall("inertial/*")):
-        if child.tag in ATTRIBUTES and child.tag not in OWNERS and (odd := set(child.attrib) - ATTRIBUTES[child.tag]):
-            raise ValueError(f"{_name_owner(child)}: unknown attribute {min(odd)!r} of <{child.tag}>")
+def _list_ignored(robot: Any) -> list[str]:
+    """Return a note on the elements and attributes that are not read, with their numbers; none without any."""
+    owners = robot.findall("link") + robot.findall("joint")
+    parts = [robot, *robot, *(part for owner in owners for part in (*owner, *owner.findall("inertial/*")))]
+    ignored = Counter[str]()
+    for part in parts:
+        if part.tag in ATTRIBUTES:
+            ignored.update(f"attribute {odd!r} of <{part.tag}>" for odd in set(part.attrib) - ATTRIBUTES[part.tag])
+        elif part.tag not in WITHOUT_INFLUENCE:
+            ignored[f"<{part.tag.rpartition('}')[2]}>"] += 1
+    listed = ", ".join(f"{name} ({count})" for name, count in sorted(ignored.items()))
+    return [f"ignored: {listed}"] if listed else []
 
 
 def _read_joint(element: Any) -> UrdfJoint:
@@ -219,8 +262,18 @@ def _read_mass(link: Any, frame: Array, about_joint: bool) -> Mass:
 
 
 def _read_turning(joint: UrdfJoint, frame: Array) -> Joint:
-    limit, axis = _find_part(joint.element, "limit", needed=True), _find_part(joint.element, "axis")
-    low, high = (_read_number(limit, key, "0", finite=False) for key in ("lower", "upper"))
+    limit, axis = _find_part(joint.element, "limit"), _find_part(joint.element, "axis")
+    low, high = -math.pi, math.pi
+    if joint.kind == "revolute" and limit is not None:
+        low, high = (_read_number(limit, key, "0", finite=False) for key in ("lower", "upper"))
+    soft = _find_part(joint.element, "safety_controller")
+    planned = [low, high]
+    for k, (key, pick) in enumerate((("soft_lower_limit", max), ("soft_upper_limit", min))):
+        if soft is not None and soft.get(key) is not None:
+            planned[k] = pick(planned[k], _read_number(soft, key))
+    dynamics = _find_part(joint.element, "dynamics")
+    damping, friction = (0.0 if dynamics is None else _read_number(dynamics, key, "0") for key in DYNAMICS)
+    effort, velocity = (_read_limit(joint, key) or math.inf for key in LIMITS)
     direction = (1.0, 0.0, 0.0) if axis is None else _read_numbers(axis, "xyz", 3)
     return Joint(
         name=joint.name,
@@ -228,10 +281,20 @@ def _read_turning(joint: UrdfJoint, frame: Array) -> Joint:
         child=joint.child,
         origin_m=(0.0, 0.0, 0.0),  # ``join_frames`` places it
         axis=make_unit_axis(to_vector(frame[:3, :3] @ np.array(direction))),
-        limits_rad=(low, high) if joint.kind == "revolute" else (-math.pi, math.pi),
-        velocity_limit_rad_s=_read_number(limit, "velocity", finite=False),
-        torque_limit_Nm=_read_number(limit, "effort", finite=False),
+        limits_rad=(low, high),
+        planning_limits_rad=(planned[0], planned[1]),
+        velocity_limit_rad_s=velocity,
+        torque_limit_Nm=effort,
+        damping_Nms_rad=damping,
+        friction_Nm=friction,
     )
+
+
+def _read_limit(joint: UrdfJoint, key: str) -> float:
+    """Return the limit of a joint's effort or velocity; infinite where it is not stated, negative or not plausible."""
+    limit = _find_part(joint.element, "limit")
+    value = math.inf if limit is None else _read_number(limit, key, "inf", finite=False)
+    return value if 0.0 <= value <= LARGEST_NUMBER else math.inf
 
 
 def _read_pose(element: Any) -> Array:

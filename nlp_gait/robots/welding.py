@@ -15,6 +15,7 @@ class FootShapes(NamedTuple):
     points: Array  #: (N, 3) corners of boxes and meshes, edges of cylinders and lowest points of spheres [m]
     kind: str  #: ``"collision"``, or ``"visual"`` if the foot has no collision shapes
     missing: tuple[str, ...] = ()  #: meshes that do not exist
+    others: tuple[str, ...] = ()  #: kinds of shapes without a flat side
 
 
 Links = dict[str, Link]
@@ -40,6 +41,8 @@ class RobotParts(NamedTuple):
     joints: Joints
     carriers: Mapping[str, str]  # the link of ``links`` that each link of the file is part of
     read_shapes: ReadShapes
+    notes: tuple[str, ...]  # what of the file is not used, and what it does not state
+    unusable: Mapping[str, str]  # by joint, why it cannot be part of a leg, in words
 
 
 def list_carriers(frames: Mapping[str, LinkFrame]) -> dict[str, str]:
@@ -54,7 +57,12 @@ def list_carriers(frames: Mapping[str, LinkFrame]) -> dict[str, str]:
 
 
 def join_frames(
-    name: str, frames: Mapping[str, LinkFrame], turning: Sequence[Joint], read_shapes: ReadShapes
+    name: str,
+    frames: Mapping[str, LinkFrame],
+    turning: Sequence[Joint],
+    read_shapes: ReadShapes,
+    notes: Sequence[str],
+    unusable: Mapping[str, str],
 ) -> RobotParts:
     """Return a robot whose links are the frames that do not turn against each other, as one each."""
     carriers = list_carriers(frames)
@@ -68,7 +76,7 @@ def join_frames(
         origin = to_vector(frames[joint.child].origin_m - frames[parent].origin_m)
         joints[joint.name] = replace(joint, parent=parent, origin_m=origin)
     root = next(link for link, frame in frames.items() if frame.parent is None)
-    return RobotParts(name, root, links, joints, carriers, read_shapes)
+    return RobotParts(name, root, links, joints, carriers, read_shapes, tuple(notes), unusable)
 
 
 def weld_faults(links: Links, joints: Joints, legs: Collection[str], notes: list[str]) -> None:

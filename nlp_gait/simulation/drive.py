@@ -122,15 +122,17 @@ class Drive:
         if self.controller is not None:
             return UNLIMITED_NM
         if self.torque_limits == "urdf" or joint.motor is None:
-            return joint.torque_limit_Nm
+            return min(joint.torque_limit_Nm, UNLIMITED_NM)
         if self.torque_limits == "stall":
             return find_stall_torque(joint)
         return joint.motor.continuous_torque_Nm
 
 
 def find_stall_torque(joint: Joint) -> float:
-    """Return the torque of a joint at stall with a lossless gear [Nm]; the stated limit if the motor is unknown."""
-    return joint.torque_limit_Nm if joint.motor is None else joint.motor.stall_torque_Nm
+    """Return the torque of a joint at stall with a lossless gear [Nm]; the stated limit or nominal torque of unknown motors."""
+    if joint.motor is not None:
+        return joint.motor.stall_torque_Nm
+    return joint.torque_limit_Nm if joint.torque_limit_Nm < math.inf else joint.nominal_torque_Nm
 
 
 # By name: as NAO's own controller, and set-points held for 40 ms, the sampling of the paper's gaits.

@@ -155,8 +155,15 @@ def add_bodies(
             axis = (body.direction * a for a in body.joint.axis)
             limits = _format_numbers(*body.joint.limits_rad)
             joint = Xml.SubElement(element, "joint", name=body.joint.name, axis=_format_numbers(*axis), range=limits)
-            if body.armature_kgm2:
-                joint.set("armature", _format_numbers(body.armature_kgm2))
+            joint.attrib |= {
+                name: _format_numbers(value)
+                for name, value in (
+                    ("armature", body.joint.armature_kgm2),
+                    ("damping", body.joint.damping_Nms_rad),
+                    ("frictionloss", body.joint.friction_Nm),
+                )
+                if value
+            }
         elif root == "free":
             Xml.SubElement(element, "freejoint")
         elif root == "planar":

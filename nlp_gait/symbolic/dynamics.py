@@ -85,7 +85,8 @@ def newton_euler(
         Gives the torques of Gupta, Pratihar, Deb (2023), eqs. (15)-(18); the recursion is that of Luh, Walker and Paul
         (1980), with each link seen from the joint through which it is reached, inertias regrouped and products of spins
         shared as Khalil and Kleinfinger (1987) do. Rotors add their inertia at the joint times its acceleration, without
-        gyroscopic torques: Featherstone (2008), section 9.6. Equations (D.1) to (D.9) in docs/model.
+        gyroscopic torques: Featherstone (2008), section 9.6. Damped joints add damping times rate. Equations (D.1) to (D.9) in
+        docs/model.
     """
     shares = shares or {}
     rotations = [relative_rotation(body, q) for body in tree]
@@ -112,20 +113,26 @@ def newton_euler(
         if body.link.name in shares:  # force and moment are linear in mass and inertia
             force, moment = force * shares[body.link.name], moment * shares[body.link.name]
         wrenches.append(Wrench(force, moment))
-    return _pass_down(tree, rotations, wrenches, qdd), wrenches[0]
+    return _pass_down(tree, rotations, wrenches, qd, qdd), wrenches[0]
 
 
 def _pass_down(
-    tree: Sequence[TreeBody], rotations: Sequence[SX], wrenches: list[Wrench], qdd: Mapping[str, SX]
+    tree: Sequence[TreeBody],
+    rotations: Sequence[SX],
+    wrenches: list[Wrench],
+    qd: Mapping[str, SX],
+    qdd: Mapping[str, SX],
 ) -> dict[str, SX]:
-    """Add the wrench of each body to that of its parent; return the torque of each joint."""
+    """Add the wrench of each body to that of its parent; return the torque of each joint's motor."""
     torques: dict[str, SX] = {}
     for i in range(len(tree) - 1, 0, -1):
-        body = tree[i]
-        assert body.joint is not None  # only the first body has none; for the type checker
-        torques[body.joint.name] = body.direction * ca.dot(DM(body.joint.axis), wrenches[i].moment)
-        if body.armature_kgm2:
-            torques[body.joint.name] += body.armature_kgm2 * qdd[body.joint.name]
+        body, joint = tree[i], tree[i].joint
+        assert joint is not None  # only the first body has none; for the type checker
+        torques[joint.name] = body.direction * ca.dot(DM(joint.axis), wrenches[i].moment)
+        if joint.armature_kgm2:
+            torques[joint.name] += joint.armature_kgm2 * qdd[joint.name]
+        if joint.damping_Nms_rad:
+            torques[joint.name] += joint.damping_Nms_rad * qd[joint.name]
         force, moment = (rotations[i] @ vector for vector in wrenches[i])
         below = wrenches[body.parent]
         lever = ca.cross(SX(DM(body.offset_m)), force)

@@ -123,16 +123,28 @@ class DriveLimits(Limit):
         self._robot, self._size = robot, size
 
     def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        n = samples.steps + 1
-        effort = DM([self._robot.joint(joint).torque_limit_Nm for joint in samples.joints])
-        speed = DM([self._robot.joint(joint).velocity_limit_rad_s for joint in samples.moving])
-        strongest, fastest = (MX(ca.repmat(limit, n, 1)) for limit in (effort, speed))
-        torque, rate = ca.vec(samples.torque), ca.vec(samples.qd)
-        joints, moving = (make_labels(names, range(n)) for names in (samples.joints, samples.moving))
-        return (
-            make_rows("effort", "Nm", torque, -strongest, strongest, joints, "instant", self._size),
-            make_rows("joint_speed", "rad/s", rate, -fastest, fastest, moving, "instant"),
-        ), {"effort_share": ca.mmax(ca.fabs(torque) / strongest), "speed_share": ca.mmax(ca.fabs(rate) / fastest)}
+        joint = self._robot.joint
+        efforts = [joint(name).torque_limit_Nm for name in samples.joints]
+        speeds = [joint(name).velocity_limit_rad_s for name in samples.moving]
+        effort, effort_share = _limit("effort", "Nm", samples.torque, samples.joints, efforts, self._size)
+        speed, speed_share = _limit("joint_speed", "rad/s", samples.qd, samples.moving, speeds)
+        return (*effort, *speed), {"effort_share": effort_share, "speed_share": speed_share}
+
+
+def _limit(
+    name: str, unit: str, values: MX, joints: Sequence[str], limits: Sequence[float], size: float = 1.0
+) -> tuple[list[Constraint], MX]:
+    """Return the rows of samples (J, n) within +- limits (J,), which may be infinite, and the largest share of a limit."""
+    limited = [k for k, limit in enumerate(limits) if limit < math.inf]
+    if not limited:
+        return [], MX(0.0)
+    if len(limited) < len(limits):
+        values = values[limited, :]
+    largest = MX(ca.repmat(DM([limits[k] for k in limited]), values.shape[1], 1))
+    labels = make_labels([joints[k] for k in limited], range(values.shape[1]))
+    value = ca.vec(values)
+    row = make_rows(name, unit, value, -largest, largest, labels, "instant", size)
+    return [row], ca.mmax(ca.fabs(value) / largest)
 
 
 class TorqueChange(Limit):

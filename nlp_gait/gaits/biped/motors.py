@@ -77,14 +77,15 @@ class Motors:
         """The robot of the dynamics, with the inertia of its rotors if that is a feature."""
         if "rotor" not in self.features:
             return self.robot
-        inertias = {}
+        joints = dict(self.robot.joints)
         for joint, rating in zip(self.joints, self._ratings, strict=True):
             if rating.reflected_inertia_kgm2 is None:
                 raise InputError(
                     f"robot {self.robot.name!r}: the motor of joint {joint!r} has no rotor_inertia_gcm2, which motors=rotor needs"
                 )
-            inertias[joint] = rating.reflected_inertia_kgm2 / (len(self.shared) if joint in self.shared else 1)
-        return replace(self.robot, armatures_kgm2=inertias)
+            share = rating.reflected_inertia_kgm2 / (len(self.shared) if joint in self.shared else 1)
+            joints[joint] = replace(joints[joint], armature_kgm2=share)
+        return replace(self.robot, joints=joints)
 
     @property
     def limits(self) -> tuple[Limit, ...]:

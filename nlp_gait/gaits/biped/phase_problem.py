@@ -96,8 +96,13 @@ def make_gait_problem(
     def draw(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
         return draw_robot(body.full, signals)
 
+    rotors = {name: joint.armature_kgm2 for name, joint in body.robot.joints.items()}
+    joints = {
+        name: replace(joint, armature_kgm2=rotors.get(name, joint.armature_kgm2))
+        for name, joint in body.simulated.joints.items()
+    }
     model = SimulationModel(
-        robot=replace(body.simulated, armatures_kgm2=body.robot.armatures_kgm2),
+        robot=replace(body.simulated, joints=joints),
         gravity=body.gravity,
         slope_rad=body.slope_rad,
         heat_loss=HEAT_LOSS.name,

@@ -21,7 +21,9 @@ from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import GRAVITY, NAO_SWING_S, STEP_M, Biped, compare_swing, make_biped_model
-from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
+from nlp_gait.robots.inference import SIDES
+from nlp_gait.robots.leg import Leg
+from nlp_gait.robots.tree import mirror_sign
 from nlp_gait.symbolic import general_leg
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.rotations import FORWARD, TO_THE_LEFT, UP, axis_rotation, turn_quaternion
@@ -36,8 +38,7 @@ LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
 # Nearly all poses are closed to this [1, rad] before the last Newton step, which squares the rest.
 NEARLY_CLOSED, CLOSED, SHARE = 1e-9, 1e-12, 0.995
 MOST_STEPS = 8
-# Share of poses that may stay open and are examined, random starts of each, and what counts as closed there [1, rad].
-MOST_EXAMINED, REACH_STARTS, REACHED = 0.05, 8, 1e-5
+LEAST_CLOSED = 0.95  # share of poses
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -200,24 +201,19 @@ def make_humanoid(
 def count_newton_steps(leg: Leg) -> int:
     """Return the steps that a leg needs after the guess: none if that is exact, else one more than closes nearly all poses.
 
-    If some poses stay open, those that no angles within the joints' limits close do not count. Raises InputError for too many.
+    A few poses, such as deep squats, may stay open and do not count: constraints keep plans off them. Raises InputError for more.
     """
     inputs = general_leg.sample_flat_foot_poses(leg)
     steps = _find_steps(leg, inputs)
     if steps is not None:
         return steps
-    left = compute_residuals(leg, MOST_STEPS - 1, inputs)
-    if np.mean(left > NEARLY_CLOSED) < MOST_EXAMINED:
-        reachable = [
-            value <= NEARLY_CLOSED or _can_reach(leg, pose) for value, pose in zip(left, inputs.T, strict=True)
-        ]
-        steps = _find_steps(leg, inputs[:, reachable])
-        if steps is not None:
-            return steps
+    closed = compute_residuals(leg, MOST_STEPS - 1, inputs) <= NEARLY_CLOSED
+    if np.mean(closed) >= LEAST_CLOSED and (steps := _find_steps(leg, inputs[:, closed])) is not None:
+        return steps
     raise InputError(
         f"the leg of joints {', '.join(leg.joints)} is not solved in {MOST_STEPS} Newton steps: its hip axes pass each other too "
-        f"far, or its ankle's; after {MOST_STEPS - 1} steps {100 * float(np.mean(left <= NEARLY_CLOSED)):.0f} % of "
-        f"{general_leg.POSES} poses are closed"
+        f"far, or its ankle's; after {MOST_STEPS - 1} steps {np.mean(closed):.0%} of {general_leg.POSES} poses are closed, and "
+        f"{LEAST_CLOSED:.0%} must be"
     )
 
 
@@ -231,24 +227,6 @@ def _find_steps(leg: Leg, inputs: Array) -> int | None:
     return None
 
 
-def _can_reach(leg: Leg, pose: Array) -> bool:
-    """Return whether angles within the limits close a pose (12,), by least squares from random angles."""
-    from scipy.optimize import least_squares
-
-    q = SX.sym("q", LEG_JOINT_COUNT)
-    residual = general_leg.make_leg_root(leg, 0, Exact(), SX(0.0)).residual(q, SX(DM(pose)))
-    misfit, jacobian = ca.Function("misfit", [q], [residual]), ca.Function("jacobian", [q], [ca.jacobian(residual, q)])
-    low, high = leg.limits_rad.T
-    starts = np.random.default_rng(0).uniform(low, high, (REACH_STARTS, LEG_JOINT_COUNT))
-    ends = (
-        least_squares(
-            lambda point: misfit(point).full()[:, 0], start, lambda point: jacobian(point).full(), bounds=(low, high)
-        )
-        for start in starts
-    )
-    return any(np.abs(end.fun).max() <= REACHED for end in ends)
-
-
 def compute_residuals(leg: Leg, steps: int, inputs: Array) -> Array:
     """Compute the largest residual of each pose (N,) after a number of steps."""
     symbols = SX.sym("inputs", len(inputs))
@@ -258,12 +236,38 @@ def compute_residuals(leg: Leg, steps: int, inputs: Array) -> Array:
     return np.abs(np.array(function.map(inputs.shape[1])(inputs))).max(axis=0)
 
 
+JOINT_COLUMNS = ("joint", "from, rad", "to, rad", "Nm", "rad/s", "kg m^2", "Nm s/rad")
+
+
+def list_joints(body: Humanoid) -> list[tuple[str, ...]]:
+    """Return a row of JOINT_COLUMNS for each joint of the left leg; both sides' values where they differ."""
+    rows = []
+    for pair in zip(*(body.biped.legs[side].joints for side in SIDES), strict=True):
+        left, right = (body.biped.full.joint(name) for name in pair)
+        sign = mirror_sign(body.biped.full, *pair)
+        low, high = sorted(sign * limit for limit in right.planning_limits_rad)
+        values = zip(
+            (
+                *left.planning_limits_rad,
+                left.torque_limit_Nm,
+                left.velocity_limit_rad_s,
+                left.armature_kgm2,
+                left.damping_Nms_rad,
+            ),
+            (low, high, right.torque_limit_Nm, right.velocity_limit_rad_s, right.armature_kgm2, right.damping_Nms_rad),
+            strict=True,
+        )
+        texts = [[f"{value:.4g}" if math.isfinite(value) else "none" for value in both] for both in values]
+        rows.append((pair[0], *(" / ".join(dict.fromkeys(both)) for both in texts)))
+    return rows
+
+
 def describe_humanoid(body: Humanoid) -> list[tuple[str, str]]:
     """Return what was inferred from a robot's file as pairs of texts: feet, legs, soles, posture, sizes."""
     biped = body.biped
     robot, legs = biped.full, biped.legs
     held = {name: angle for name, angle in biped.posture_rad.items() if angle}
-    rows = [("root", robot.root), ("mass", f"{robot.mass_kg:.2f} kg, {biped.mass_scale:.2f} times NAO's (mu)")]
+    rows = [("root", robot.root), ("mass", f"{robot.mass_kg:.2f} kg")]
     for side in BOTH_FEET.values():
         leg, foot = legs[side], robot.feet[side]
         rows.append((f"{side} leg", ", ".join(leg.joints)))
@@ -277,7 +281,8 @@ def describe_humanoid(body: Humanoid) -> list[tuple[str, str]]:
     left = legs["left"]
     most = max(body.newton_steps.values())
     rows += [
-        ("leg length", f"{biped.leg_length_m:.4f} m, {biped.length_scale:.3f} times NAO's (lambda)"),
+        ("leg length", f"{biped.leg_length_m:.4f} m"),
+        ("left and right", "; ".join(biped.differences) or "alike: a step and its mirror image are planned as one"),
         (
             "straight knee",
             f"at {left.straight_rad:z.4f} rad, bends to {'larger' if left.bend > 0 else 'smaller'} angles",

@@ -38,6 +38,26 @@ class Stairs:
     stair_run_m: float = 0.0
 
 
+@dataclass(frozen=True, kw_only=True)
+class Sides:
+    """How a robot whose left and right differ is planned, where a step and its mirror image are one.
+
+    Attributes:
+        alike: take left and right as alike, though they differ by over 2 %: steps on the right foot may then break limits
+    """
+
+    alike: bool = False
+
+    def check(self, body: Humanoid) -> None:
+        """Raise InputError for a robot whose left and right differ, unless they are taken as alike."""
+        if body.biped.differences and not self.alike:
+            raise InputError(
+                f"robot {body.full.name!r}: a step and its mirror image are planned as one here, but left and right differ: "
+                f"{'; '.join(body.biped.differences[:3])}; plan a walk on a level floor, which plans every step with its own "
+                "side, or set alike=true"
+            )
+
+
 @maker
 def humanoid_ssp(robot: HumanoidOptions, options: PhaseOptions) -> GaitProblem:
     """Single support; the swing foot moves by twice the step length.
@@ -59,24 +79,28 @@ def humanoid_dsp(robot: HumanoidOptions, options: PhaseOptions, loads: LoadOptio
 
 
 @maker
-def humanoid_cycle(robot: HumanoidOptions, options: CycleOptions) -> GaitProblem:
+def humanoid_cycle(robot: HumanoidOptions, options: CycleOptions, sides: Sides) -> GaitProblem:
     """Walking cycle: one step, whose mirror image is the next one.
 
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; general legs, the free lean of the torso and the
         cycle are this package's own.
     """
-    return plan_cycle(robot.make_body(), options)
+    body = robot.make_body()
+    sides.check(body)
+    return plan_cycle(body, options)
 
 
 @maker
-def humanoid_walk(robot: HumanoidOptions, options: WalkOptions, stairs: Stairs) -> GaitProblem:
+def humanoid_walk(robot: HumanoidOptions, options: WalkOptions, stairs: Stairs, sides: Sides) -> GaitProblem:
     """Whole walk from standing to standing: weight shift, half step, steps, half step, weight shift.
 
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
     """
     body, flight = robot.make_body(), None
+    if not options.footholds:
+        sides.check(body)
     if stairs.stair_rise_m or stairs.stair_run_m:
         if options.slope_deg:
             raise InputError(f"stairs are level, but slope_deg is {options.slope_deg:g}; leave out one of them")

@@ -105,7 +105,8 @@ class WholeBodyQP:
         hessian, linear = weighted.T @ tasks, -(goals @ weighted)
         hessian[np.diag_indices(len(hessian))] += REGULARISATION
         # Torques of all coordinates: motion @ x + rest; those of the root are zero.
-        motion, bias = np.hstack([inertia[:, free], -contact]), data.qfrc_bias + inertia @ acceleration
+        motion = np.hstack([inertia[:, free], -contact])
+        bias = data.qfrc_bias - data.qfrc_passive + inertia @ acceleration
         rows = np.vstack([motion[:root], motion[joints], np.hstack([np.zeros((len(self.cone), count)), self.cone])])
         low = np.concatenate([-bias[:root], -self._limits - bias[joints], np.zeros(len(self.cone))])
         high = np.concatenate([-bias[:root], self._limits - bias[joints], np.full(len(self.cone), UNBOUNDED)])

@@ -130,7 +130,7 @@ def test_features() -> None:
     none = parse_nao_motors("", ROBOT)
     assert none.features == () and none.limits == () and none.power is None and none.model is ROBOT
     heavy = parse_nao_motors("rotor", ROBOT)
-    assert heavy.limits == () and heavy.power is None and heavy.model.armatures_kgm2.keys() == set(JOINTS)
+    assert heavy.limits == () and heavy.power is None and {j.name for j in heavy.model.joints.values() if j.armature_kgm2} == set(JOINTS)
     with pytest.raises(UnknownNameError, match="feature in motors 'ankle'"):
         Motors(features=("ankle",), robot=ROBOT, joints=JOINTS)
     with pytest.raises(UnknownNameError, match="did you mean 'ankle'"):
@@ -148,7 +148,7 @@ def test_joints_that_share_a_motor() -> None:
     np.testing.assert_allclose(np.delete(shared, JOINTS.index("RHipYawPitch"), axis=0), at_motors(), rtol=1e-15)
     assert not shared[JOINTS.index("RHipYawPitch")].any()
     inertia = {
-        name: motors.model.armatures_kgm2["LHipYawPitch"]
+        name: motors.model.joint("LHipYawPitch").armature_kgm2
         for name, motors in (
             ("one each", Motors(features=("rotor",), robot=ROBOT, joints=JOINTS)),
             ("one for two", parse_nao_motors("rotor", ROBOT)),
