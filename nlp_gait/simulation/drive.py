@@ -132,7 +132,7 @@ def find_stall_torque(joint: Joint) -> float:
     """Return the torque of a joint at stall with a lossless gear [Nm]; the stated limit or nominal torque of unknown motors."""
     if joint.motor is not None:
         return joint.motor.stall_torque_Nm
-    return joint.torque_limit_Nm if joint.torque_limit_Nm < math.inf else joint.nominal_torque_Nm
+    return joint.torque_limit_Nm if joint.torque_limit_Nm < UNLIMITED_NM else joint.nominal_torque_Nm
 
 
 # By name: as NAO's own controller, and set-points held for 40 ms, the sampling of the paper's gaits.

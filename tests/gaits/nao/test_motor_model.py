@@ -130,7 +130,11 @@ def test_features() -> None:
     none = parse_nao_motors("", ROBOT)
     assert none.features == () and none.limits == () and none.power is None and none.model is ROBOT
     heavy = parse_nao_motors("rotor", ROBOT)
-    assert heavy.limits == () and heavy.power is None and {j.name for j in heavy.model.joints.values() if j.armature_kgm2} == set(JOINTS)
+    assert (
+        heavy.limits == ()
+        and heavy.power is None
+        and {j.name for j in heavy.model.joints.values() if j.armature_kgm2} == set(JOINTS)
+    )
     with pytest.raises(UnknownNameError, match="feature in motors 'ankle'"):
         Motors(features=("ankle",), robot=ROBOT, joints=JOINTS)
     with pytest.raises(UnknownNameError, match="did you mean 'ankle'"):

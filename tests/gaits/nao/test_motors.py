@@ -58,7 +58,9 @@ def test_both_are_simulated_with_the_rotors_of_the_plan() -> None:
         assert plain is not None and not any(joint.armature_kgm2 for joint in plain.robot.joints.values())
         assert heavy is not None and heavy.robot.joint("LKneePitch").armature_kgm2 == pytest.approx(4.2e-7 * 130.85**2)
         assert heavy.robot.joint("RAnkleRoll").armature_kgm2 == pytest.approx(4.2e-7 * 201.3**2)
-        assert heavy.robot.joint("LHipYawPitch").armature_kgm2 == pytest.approx(4.2e-7 * 201.3**2 / 2)  # one motor for two
+        assert heavy.robot.joint("LHipYawPitch").armature_kgm2 == pytest.approx(
+            4.2e-7 * 201.3**2 / 2
+        )  # one motor for two
 
 
 def test_a_robot_whose_rotors_are_unknown_is_refused(tmp_path: Path) -> None:
