@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from statistics import median
 
 import numpy as np
@@ -21,7 +22,7 @@ from compare.analysis.record_statistics import (
 )
 from compare.analysis.units import FOUND, format_gap, name_solver, with_unit
 from compare.study.record import RunRecord, find_best, group_by
-from compare.study.references import BETTER, Reference, find_reference
+from compare.study.references import BETTER, OWN, Reference, find_reference
 from compare.study.run import GRADIENT_SOLVERS
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Objective
@@ -167,24 +168,29 @@ class Comparison:
 def compare_problems(
     records: Sequence[RunRecord],
     references: Mapping[str, float] | None = None,
+    folder: Path | None = None,
 ) -> list[Comparison]:
     """Return one comparison per problem among records, in their order; InputError if runs disagree on a problem's objective.
 
-    Gaps are measured from a problem's entry in ``references``, else from the shipped best known value of exactly this
-    problem, else from the best of the records.
+    Gaps are measured from a problem's entry in ``references``, else from the best known value of exactly this problem, shipped or
+    proven in the folder, else from the best of the records.
     """
     groups = group_by(records, lambda record: record.problem).items()
-    return [_make_comparison(name, group, (references or {}).get(name)) for name, group in groups]
+    return [_make_comparison(name, group, (references or {}).get(name), folder) for name, group in groups]
 
 
-def _make_comparison(problem: str, records: Sequence[RunRecord], reference: float | None) -> Comparison:
+def _make_comparison(
+    problem: str, records: Sequence[RunRecord], reference: float | None, folder: Path | None
+) -> Comparison:
     objective = records[0].inputs.objective
     for record in records:
         if record.inputs.objective != objective:
             raise InputError(f"records of {problem!r} disagree on the objective: {record.solver}, run {record.run}")
-    known = find_reference(records[0].inputs.problem)
+    known, best = find_reference(records[0].inputs.problem, folder), find_best_known(records)
+    if known.bound is not None and compute_gap(best, known.bound, objective) < -BETTER:
+        known = Reference(source=f"{OWN}; a run is better than the bound of {known.proven_as}, which is not used")
     if reference is None:
-        reference = find_best_known(records) if known.objective is None else known.objective
+        reference = best if known.objective is None else known.objective
     solvers = []
     for name, group in group_by(records, lambda record: record.solver).items():
         runs = tuple(sorted(group, key=lambda record: record.run))

@@ -128,7 +128,7 @@ def compare(
     records = run_in_folder(settings, out, jobs, scheduler, remedy)
     records += read_imported_records(out, records)
     written = write_report(out, records, read_study_file(out))
-    comparisons = compare_problems(records)
+    comparisons = compare_problems(records, folder=out)
     for sentence in (sentence for comparison in comparisons for sentence in describe_failures(comparison)):
         say_error(sentence)
     lost = ", ".join(s.name for c in comparisons for s in c.solvers if not any(r.x for r in s.records))

@@ -44,7 +44,7 @@ def write_report(
     further: FurtherFiles = REPORT_ALONE,
 ) -> list[Path]:
     """Write the report, its figures as SVG, and further files; return all paths."""
-    comparisons = compare_problems(records)
+    comparisons = compare_problems(records, folder=folder)
     with share_looks({name_solver(record.solver) for record in records}):
         document = make_study_document(comparisons, file)
         written = write_document(folder, document)

@@ -3,13 +3,16 @@
 import json
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem, make_key
 from nlp_gait.decoding import decode
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Objective
 from nlp_gait.gaitbench.facts import SIX_DIGITS
 
@@ -62,10 +65,15 @@ def load_shipped() -> Mapping[str, Shipped]:
     return {hash_json(make_key(entry.problem)): entry for entry in entries}
 
 
-def find_reference(problem: Mapping[str, Any]) -> Reference:
-    """Return the reference of a problem as ``identify_problem`` describes it; without a shipped value, one that says so."""
+def find_reference(problem: Mapping[str, Any], folder: Path | None = None) -> Reference:
+    """Return the reference of a problem as ``identify_problem`` describes it; without a known value, one that says so.
+
+    What is not shipped may be proven in a folder, or in the folder ``certainty`` next to it, by ``nlp-gait certainty``.
+    """
     shipped = load_shipped().get(hash_json(make_key(problem)))
     if shipped is None:
+        if folder is not None and (proven := _find_proven(problem, folder)):
+            return proven
         if generated := _find_generated(str(problem.get("options", {}).get("instance", "")), problem):
             return generated
         listed = any(entry.problem["name"] == problem["name"] for entry in load_shipped().values())
@@ -74,6 +82,28 @@ def find_reference(problem: Mapping[str, Any]) -> Reference:
     evidence = f"best of {shipped.found_by}" if bound is None else f"proven to {describe_gap(bound, objective)}"
     source = f"shipped, {evidence}"
     return Reference(objective=objective, x=shipped.x, bound=bound, source=source, proven_as=shipped.proven_as)
+
+
+def _find_proven(problem: Mapping[str, Any], folder: Path) -> Reference | None:
+    """Return the tightest proof of a problem in a folder or next to it; files that are no certificates are left out."""
+    paths = [
+        path for place in (folder, folder.parent / "certainty") for path in sorted(place.glob("*-certificate.json"))
+    ]
+    if not paths:
+        return None
+    from nlp_gait.proofs.certificate import read_certificate
+
+    proofs = []
+    for path in paths:
+        with suppress(InputError):
+            file = read_certificate(path)
+            if not describe_difference(file.problem, problem) and math.isfinite(file.certificate.bound):
+                proofs.append((file.certificate.gap, file.certificate, path.name))
+    if not proofs:
+        return None
+    _, proof, name = min(proofs, key=lambda found: found[0])
+    source = f"proven to {describe_gap(proof.bound, proof.objective)} by `nlp-gait certainty` on this machine ({name})"
+    return Reference(objective=proof.objective, x=proof.x, bound=proof.bound, source=source, proven_as=name)
 
 
 def _find_generated(id: str, problem: Mapping[str, Any]) -> Reference | None:

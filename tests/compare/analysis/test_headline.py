@@ -3,10 +3,12 @@
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from casadi import MX
 
 import nlp_gait
 from compare.analysis.best_known import describe_value
@@ -19,8 +21,12 @@ from compare.study.references import Reference, find_reference
 from compare.study.run import ProblemSpec, Run, Stop
 from compare.study.study import Study, run_study
 from nlp_gait.backends.identity import identify_problem
+from nlp_gait.formulation import Constraint
 from nlp_gait.formulation.result import load_result
-from nlp_gait.proofs.certificate import load_certificates
+from nlp_gait.proofs.branch_and_bound import certify
+from nlp_gait.proofs.certificate import load_certificates, make_certificate_file
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import row, toy
 from tests.compare.records import POWER, record, study
 
 CERTIFIED = load_certificates()["walk12-lambda-0.4"].problem
@@ -212,3 +218,27 @@ def test_many_problems_have_one_headline() -> None:
         "Over 5 problems, the median of the median gaps is newton 0 %, swarm 5.5 % and colony 18 %. Best known values are "
         "reached by newton on 5."
     )
+
+
+def bowl(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+    """A bowl with the least value 10 at (0.5, 0)."""
+    return 10 + (x - 0.5) ** 2 + y**2, (row(x + y, lower=limit),)
+
+
+def test_what_certainty_proved_in_a_folder_is_known_there(tmp_path: Path) -> None:
+    problem = toy(bowl, limit=-1.0)
+    certificate = certify(problem, np.array([0.5, 0.0]), tolerance=1e-7, time_limit_s=60.0)
+    (tmp_path / "certainty").mkdir()
+    path = tmp_path / "certainty" / "toy-certificate.json"
+    path.write_text(json.dumps(asdict(make_certificate_file(problem, certificate))))
+    (tmp_path / "certainty" / "broken-certificate.json").write_text("{}")
+    runs = [replace(r, inputs=replace(r.inputs, problem=identify_problem(problem))) for r in make_runs(pso=[10.1] * 3)]
+    (comparison,) = compare_problems(runs, folder=tmp_path / "results")
+    assert write_headline(comparison) == "The median PSO run ends 1.0 % above the proven optimum of 10.000000 W."
+    assert comparison.known.source == (
+        "proven to six digits by `nlp-gait certainty` on this machine (toy-certificate.json)"
+    )
+    assert "best value found" in write_headline(compare_problems(runs, folder=tmp_path)[0])  # another folder
+    better = [replace(runs[0], objective=9.9), *runs[1:]]
+    (contradicted,) = compare_problems(better, folder=tmp_path / "results")
+    assert contradicted.reference == 9.9 and "which is not used" in contradicted.known.source
