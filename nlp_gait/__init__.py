@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from nlp_gait.errors import GaitError as GaitError
     from nlp_gait.formulation import GaitProblem as GaitProblem
     from nlp_gait.formulation import list_problems as list_problems
+    from nlp_gait.formulation.plain_problem import problem as problem
     from nlp_gait.formulation.solution import Solution as Solution
     from nlp_gait.loading import load as load
 
@@ -37,6 +38,7 @@ __version__ = "0.2.0"
 _PUBLIC = {
     "nlp_gait.errors": "GaitError",
     "nlp_gait.formulation": "GaitProblem list_problems",
+    "nlp_gait.formulation.plain_problem": "problem",
     "nlp_gait.formulation.solution": "Solution",
     "nlp_gait.backends.kernel.compiled": "CompiledObjective compile_objective",
     "nlp_gait.backends.kernel.compiled_function": "CompiledFunction compile_function",

@@ -49,7 +49,7 @@ VERBS = frozenset(
 )
 # Errors for `raise` and fields of data classes; and what files call that certificates are hashed with.
 NO_VERBS = {"unknown", "bad_setting", "tunable", "main", "command", "maker", "never"}
-NO_VERBS |= {"available_cores", "native_lanes", "lane_flags", "target_cost"}
+NO_VERBS |= {"available_cores", "native_lanes", "lane_flags", "target_cost", "problem"}
 NOT_PARTICIPLES = frozenset({"_embed", "_speed", "speed", "seed", "_seed", "_feed", "_need", "embed", "proceed"})
 
 

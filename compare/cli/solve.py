@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 from typer import Option
 
 import nlp_gait
@@ -25,6 +26,7 @@ from nlp_gait.interrupts import Interrupted
 from nlp_gait.proofs.guarantee import guarantee
 
 SHOWN_MARGINS = 4
+SHOWN_VARIABLES, SHOWN_ROWS = 12, 20  # of a solution; both tables together have no more than the second number
 LINEAR_SOLVER = "Linear solver of IPOPT, for example ma57 if its library is installed (default: mumps)."
 SPEEDS = "Speeds > 0 of the inner steps [m/s], separated by commas; between them it changes evenly."
 TURN = "Turn to the left along an arc, by 15 degrees with each step unless --steps; negative turns to the right."
@@ -51,6 +53,7 @@ def solve(
     solver: Annotated[str, Option(help="NLP solver; see nlp-gait list.")] = "ipopt",
     linear_solver: Annotated[str | None, Option(help=LINEAR_SOLVER)] = None,
     jobs: options.Jobs = None,
+    show_all: Annotated[bool, Option("--all", help="Print all variables and active constraints.")] = False,
     out: Annotated[Path | None, Option(help="Write the solution to this JSON file."), OUTPUT_FILE] = None,
 ) -> Output:
     """Solve a problem with an NLP solver from several random starts; the exact functions judge the best.
@@ -79,12 +82,14 @@ def solve(
             if not isinstance(interrupt.partial, Solution):
                 raise
             solution, stopped = interrupt.partial, interrupt.sentence
-    proven = guarantee(loaded, loaded.check_x(solution.x)) if solution.feasible else None
+    proven = guarantee(loaded, loaded.check_x(solution.x)) if solution.feasible and loaded.moves else None
     reference = find_reference(identify_problem(loaded))
     data = {**solution.to_json(), "guaranteed": None if proven is None else asdict(proven), **reference.to_json()}
-    parts = [*_describe(solution)]
+    parts = [*_describe(solution, show_all)]
     if proven is not None:
-        parts += [f"Guaranteed: {proven}", describe_value(reference, solution.objective, loaded.objective)]
+        parts.append(f"Guaranteed: {proven}")
+    if solution.feasible and reference.objective is not None:
+        parts.append(describe_value(reference, solution.objective, loaded.objective))
     written, failures = [], [] if solution.converged else [solution.status]
     if out is not None:
         try:
@@ -98,21 +103,30 @@ def solve(
     return Output(data=data, parts=parts, written=written, failures=failures, interrupted=stopped)
 
 
-def _describe(solution: Solution) -> Iterator[str | Rows]:
+def _describe(solution: Solution, show_all: bool) -> Iterator[str | Rows]:
     problem, best = solution.problem, solution.best
     value = with_unit(solution.objective, problem.objective.unit)
     words = f"{problem.objective.name} {value}" if solution.feasible else "no feasible point was found"
     yield f"{problem.address}: {words} ({solution.status})"
     kind = "Optimum" if solution.converged else "Best feasible point" if solution.feasible else "Least infeasible point"
-    yield Rows(kind, ("variable", "value"), [(name, f"{value:.6g}") for name, value in solution.x.items()])
-    if solution.active_constraints:
+    x, active = list(solution.x.items()), solution.active_constraints
+    if not show_all and len(x) > SHOWN_VARIABLES:
+        order = np.argsort(-np.abs(best.x) / problem.scale, kind="stable")[:SHOWN_VARIABLES]
+        x, kind = [x[i] for i in order], f"{kind}: the largest variables in units of their ranges"
+    shown = active if show_all else active[: SHOWN_ROWS - len(x)]
+    units = {variable.name: variable.unit for variable in problem.variables}
+    yield Rows(kind, ("variable", "value"), [(name, with_unit(value, units[name], ".6g")) for name, value in x])
+    if active:
         columns = {
             "bound": lambda a: a.name,
             "side": lambda a: a.side,
             "at": lambda a: with_unit(a.bound, a.unit, "g"),
             "price": lambda a: f"{a.price:.4g} {a.price_unit}",
         }
-        yield tabulate("Active constraints", solution.active_constraints, columns)
+        yield tabulate("Active constraints, dearest first", shown, columns)
+    hidden = len(solution.x) - len(x), len(active) - len(shown)
+    if any(hidden):
+        yield f"and {hidden[0]:,} more variables and {hidden[1]:,} more active constraints: --all"
     counts, time = solution.evaluations, solution.time_s
     yield (
         f"{sum(start.converged for start in solution.starts)} of {len(solution.starts)} starts converged; "

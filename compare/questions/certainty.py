@@ -31,6 +31,7 @@ from nlp_gait.proofs.checkpoint import PROVER
 
 # Branch and bound is for this many variables, because its work grows exponentially with them; a least-power form allows nine.
 MOST_VARIABLES = 4
+FIRST_STARTS = 20  # before a proof that branch and bound may give at once
 LISTED = 10  # best distinct optima
 BATCH = 250  # starts that are stored together
 # Ends are one optimum if their objectives differ by no more than this, relative, and no variable by more than this share of its
@@ -77,7 +78,9 @@ class FoundCertainty:
         """What is proven, in one sentence."""
         c = self.certificate
         if c is None:
-            return f"nothing here: none was requested, or there are over {MOST_VARIABLES} variables, and it is no phase of NAO"
+            n = len(self.problem.names)
+            too_many = f"branch and bound takes at most {MOST_VARIABLES} variables, this problem has {n}"
+            return f"nothing: {too_many if n > MOST_VARIABLES else 'no proof was requested'}"
         if not math.isfinite(c.bound):
             return f"nothing: the time limit was reached before a finite bound, after {c.boxes:,} boxes"
         unit = self.problem.objective.unit
@@ -110,11 +113,14 @@ class FoundCertainty:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Certainty(Question[FoundCertainty]):
-    """How certain is it that the best known optimum is the global one: many starts and, if possible, a proof."""
+    """How certain is it that the best known optimum is the global one: a proof where possible, and many starts.
+
+    With few variables a proof is tried at once, from the best of some starts; many starts follow only if it fails.
+    """
 
     name: ClassVar[str] = "certainty"
 
-    starts: int  #: of IPOPT
+    starts: int  #: of IPOPT, at most
     tolerance: float = TOLERANCE  #: of the proof, relative
     time_limit_s: float = 1800.0  #: of the proof [s]; 0 for none
     seed: int = 0  #: of the starts
@@ -138,13 +144,33 @@ class Certainty(Question[FoundCertainty]):
             InputError: no start converged.
             CompilerError: a proof is requested and there is no compiler.
         """
-        problem, folder = self.problem, work.memo.folder
-        ends = run_stored_starts(problem, work, starts=self.starts, seed=self.seed)
+        problem = self.problem
+        is_small = len(problem.names) <= MOST_VARIABLES
+        proves = self.time_limit_s > 0.0 and (is_small or has_power_form(problem))
+        starts = min(self.starts, FIRST_STARTS) if proves and is_small else self.starts
+        ends = run_stored_starts(problem, work, starts=starts, seed=self.seed)
+        certificate = self._prove(cluster_ends(problem, ends), work) if proves else None
+        if starts < self.starts and (certificate is None or not certificate.closed):
+            ends = run_stored_starts(problem, work, starts=self.starts, seed=self.seed)
         optima = cluster_ends(problem, ends)
         if not optima:
             raise InputError(
-                f"none of {self.starts} starts of {problem.name} converged to a feasible point; try more starts"
+                f"none of {len(ends)} starts of {problem.name} converged to a feasible point; try more starts"
             )
+        yield FoundCertainty(
+            problem=problem,
+            starts=len(ends),
+            statuses=dict(Counter(end.status for end in ends)),
+            optima=tuple(optima),
+            largest_missed=bound_missed(sum(optimum.count for optimum in optima)),
+            certificate=certificate,
+        )
+
+    def _prove(self, optima: Sequence[LocalOptimum], work: Work) -> Certificate | None:
+        """Return the proof from the best optimum, or from the shipped one; None if there is none."""
+        problem, folder = self.problem, work.memo.folder
+        if not optima:
+            return None
         best, x = optima[0].objective, optima[0].x
         reference = find_reference(identify_problem(problem))
         if reference.objective is not None and problem.objective.sign * (best - reference.objective) > 0.0:
@@ -157,18 +183,7 @@ class Certainty(Question[FoundCertainty]):
             checkpoint = None if folder is None else folder / name
             return certify(problem, np.array(x), **limits, progress=work.progress, checkpoint=checkpoint)
 
-        certificate = None
-        if self.time_limit_s and (len(problem.names) <= MOST_VARIABLES or has_power_form(problem)):
-            inputs = {**identity, **limits, "prover": PROVER}
-            certificate = work.compute(Certificate, "certificate", inputs, prove)
-        yield FoundCertainty(
-            problem=problem,
-            starts=self.starts,
-            statuses=dict(Counter(end.status for end in ends)),
-            optima=tuple(optima),
-            largest_missed=bound_missed(sum(optimum.count for optimum in optima)),
-            certificate=certificate,
-        )
+        return work.compute(Certificate, "certificate", {**identity, **limits, "prover": PROVER}, prove)
 
     def get_optimum(self, findings: FoundCertainty) -> float:
         return findings.optima[0].objective

@@ -52,9 +52,9 @@ PREFIXED = {"W": ("mW", 1e3)}
 EXPLANATION = (
     "The slope is the derivative of the optimum with respect to the quantity, from the multipliers; next to it are the changes "
     "found by solving again one step lower and one step higher. The line is the straight line on which x* moves, in steps of "
-    "the quantity: beyond it, another kink or limit takes over. dbm is the dynamic balance margin, the distance of the "
-    "zero-moment point from the edge of the soles."
+    "the quantity: beyond it, another kink or limit takes over."
 )
+OF_GAITS = " dbm is the dynamic balance margin, the distance of the zero-moment point from the edge of the soles."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -288,7 +288,7 @@ class Prices(Question[FoundPrices]):
             *make_table(findings.robot[:LISTED], data),
             f"The first-order conditions are satisfied to {findings.residual:.1e}; {findings.dependent} of the active "
             "constraints follow from others.",
-            EXPLANATION,
+            EXPLANATION + (OF_GAITS if problem.moves else ""),
         ]
         if findings.weak:
             parts.append(f"Active without a price, so that derivatives are one-sided: {', '.join(findings.weak)}")

@@ -79,10 +79,11 @@ class Question(ABC, Generic[F]):
     def add_best_known(self, findings: F) -> "Answer":
         """Return the answer with the shipped best known value of the problem and its distance from the optimum found."""
         answer, reference = self.report(findings), find_reference(identify_problem(self.problem))
-        sentence = describe_value(
-            reference, self.get_optimum(findings), self.problem.objective, "the optimum found here"
-        )
         data = {**answer.data, **reference.to_json()}
+        if reference.objective is None:
+            return replace(answer, data=data)
+        optimum, what = self.get_optimum(findings), "the optimum found here"
+        sentence = describe_value(reference, optimum, self.problem.objective, what)
         return replace(answer, headline=(*answer.headline, f"{sentence}."), data=data)
 
 

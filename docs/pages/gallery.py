@@ -39,7 +39,7 @@ def configuration(root: Path) -> dict[str, Any]:
         "examples_dirs": str(copy),
         "gallery_dirs": "generated/gallery",
         "filename_pattern": r"(?<!your_own_paper)\.py$",  # which finds its table by its own place: tests run it
-        "ignore_pattern": r"(bring_your_own|__init__)\.py$",
+        "ignore_pattern": r"(bring_your_own|welded_beam|__init__)\.py$",
         "within_subsection_order": Graded(),
         "image_scrapers": (figures,),
         "reset_modules": (),

@@ -19,7 +19,7 @@ from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem, load
-from nlp_gait.formulation.solution import ActiveConstraint, Guess, Outcome, Solution
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ActiveConstraint, Guess, Outcome, Solution
 from nlp_gait.interrupts import Interrupted, Stop, defer_interrupts, never
 from nlp_gait.processes import has_fork, run_in_forks
 
@@ -154,10 +154,12 @@ def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int =
     status = best.status
     if not best.converged:
         names = ", ".join(f"{row.name} (by {row.violation:.3g} {row.unit})" for row in violations[:3])
-        status = f"no start converged; the best feasible one {best.status}"
+        status = f"no start converged; ending of the best feasible one: {best.status}"
         if not best.feasible:
-            status = f"no start converged to a feasible point; the least infeasible one {best.status}"
+            status = f"no start converged to a feasible point; ending of the least infeasible one: {best.status}"
         status += f"; violated: {names}; relax these limits or widen the bounds" if names else ""
+        if any(row.lower == row.upper for row in violations[:3]):
+            status += f"; equations are satisfied to {FEASIBILITY_TOLERANCE:g} of their scale: bounds on both sides allow more"
         status += "" if np.isfinite(best.cost) else f"; {problem.objective.name} is {best.cost} there"
     prices = _find_active(problem, values, best.guess) if best.converged and best.guess is not None else ()
     return Solution(
@@ -193,7 +195,7 @@ def _find_active(problem: GaitProblem, values: ExactValues, guess: Guess) -> Ite
             bound=float(getattr(values, side)[i]),
             unit=exact.row_units[i],
             price=float(problem.objective.sign * slopes[i]),
-            price_unit=f"{per}per {exact.row_units[i]}",
+            price_unit=f"{per}per {'unit' if exact.row_units[i] == '1' else exact.row_units[i]}",
         )
 
 

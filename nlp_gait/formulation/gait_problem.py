@@ -38,6 +38,8 @@ Origin: TypeAlias = "tuple[Callable[..., GaitProblem], Mapping[str, Any]]"
 Start = Callable[[Mapping[str, float], np.random.Generator], Array]
 # A point is on a bound if it misses it by at most this share of the variable's default range.
 ROUNDING = 1e-6
+LONGEST_LINE = 98  # of a problem that is printed, without its brackets
+MOST_ROWS = 40  # of a printed table
 LIMITS_OPTION = "limits"  # of makers whose problems have phases
 
 
@@ -60,9 +62,9 @@ class SolverHints:
         check_choice("hessian", self.hessian, ("exact", "limited-memory"))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class GaitProblem:
-    """A gait problem with the current values of its parameters.
+    """A gait problem, or any other one, with the current values of its parameters.
 
     Copies made by ``with_values`` share everything that was built from the mathematics; ``derive`` changes the mathematics. A
     problem may be used by several threads. It is pickled as its maker's name, options and values.
@@ -102,6 +104,30 @@ class GaitProblem:
         duplicates = [name for name, count in counts.items() if count > 1]
         if duplicates:
             raise InputError(f"problem {self.name!r}: variables or parameters are duplicated: {', '.join(duplicates)}")
+
+    def __repr__(self) -> str:
+        goal, n = self.objective, len(self.variables)
+        text = f"{self.address}: {goal.sense} {goal.name} [{goal.unit}] over {n} variables, {len(self.own_parameters)} parameters"
+        return f"<{text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 3] + '...'}>"
+
+    def describe(self) -> str:
+        """Return tables of the variables, parameters and options, as text; ``print(problem.describe())``."""
+        variables = [(v.name, f"{low:g}", f"{high:g}", v.unit, v.description) for v, low, high in
+                     zip(self.variables, self.lower.tolist(), self.upper.tolist(), strict=True)]  # fmt: skip
+        parameters = [(q.name, f"{self.value(q.name):g}", q.unit, q.description) for q in self.own_parameters]
+        blocks = [f"{self.address}: {self.title}", repr(self)[1:-1].partition(": ")[2]]
+        for header, rows in (
+            (("variable", "lower", "upper", "unit", ""), variables),
+            (("parameter", "value", "unit", ""), parameters),
+            (("option", "value"), [(name, str(value)) for name, value in self.options.items()]),
+        ):
+            blocks += [_format_table(header, rows)] if rows else []
+        return "\n\n".join(blocks)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is a motion over time, of which limits and figures make sense: a gait."""
+        return self.grid is not None or bool(self.rows_over_time) or self.display.motion is not None
 
     @property
     def searchable(self) -> bool:
@@ -332,7 +358,7 @@ class GaitProblem:
             i = outside[0]
             raise InputError(
                 f"x0 of {self.name}: {self.names[i]} is {array[i]:g}, outside its bounds [{self.lower[i]:g}, "
-                f"{self.upper[i]:g}] {self.variables[i].unit}; start within them, or widen them"
+                f"{self.upper[i]:g}] {self.variables[i].unit} by {violation[i]:.2g}; start within them, or widen them"
             )
         return np.clip(array, self.lower, self.upper)
 
@@ -411,6 +437,15 @@ def _make_again(make: Callable[..., GaitProblem], options: tuple[tuple[str, Any]
     if repr(problem.display.robot) != robot:
         raise InputError(f"problem {problem.name!r}: the file of its robot has changed since the problem was pickled")
     return problem
+
+
+def _format_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return aligned columns of the first rows."""
+    lines = [header, *rows[:MOST_ROWS]]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(header))]
+    text = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
+    more = [f"and {len(rows) - MOST_ROWS:,} more"] if len(rows) > MOST_ROWS else []
+    return "\n".join([*text, *more])
 
 
 def draw_uniform(names: Sequence[str], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:

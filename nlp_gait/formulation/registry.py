@@ -19,6 +19,7 @@ from nlp_gait.formulation.assembly import Assembly, Parameter, Variable
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import is_number
+from nlp_gait.formulation.plain_problem import name_problem
 from nlp_gait.providers import PROBLEMS, import_object
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -123,7 +124,9 @@ def _load_user_maker(name: str) -> Maker:
     @functools.wraps(make)
     def make_checked(**options: Any) -> GaitProblem:
         check_options(make, options)
-        problem = user_code.call_user_code(name, path, lambda: make(**options))
+        problem = name_problem(
+            user_code.call_user_code(name, path, lambda: make(**options)), user_code.shorten_name(name)
+        )
         user_code.call_user_code(name, path, lambda: check_mathematics(problem))
         hashes = {**problem.files, "code": files.digest}
         return replace(problem, loaded_as=name, files=hashes).with_origin(origin, options)

@@ -54,7 +54,7 @@ class Certificate:
     @property
     def gap(self) -> float:
         """Relative distance of bound and objective."""
-        return abs(self.bound - self.objective) / abs(self.objective)
+        return abs(self.bound - self.objective) / (abs(self.objective) or 1.0)
 
 
 def certify(
@@ -97,8 +97,10 @@ def certify(
     started, used = started - tree.time_s, used - tree.cpu_s  # of earlier runs
     while len(tree.lowest) and time.perf_counter() < deadline:
         _halve_best(tree, bounds, target)
-        left = f"{100 * tree.estimate_share_left():.2g} % of the tree left"
-        progress(f"{tree.enclosed} boxes, bound {sign * tree.find_bound(target):.6g}, {left}")
+        bound, left_s = tree.find_bound(target), max(deadline - time.perf_counter(), 0.0)
+        gap = f"gap {100 * (cost - bound) / (abs(cost) or 1.0):.2g} % of {100 * tolerance:.2g} %"
+        left = f"{100 * tree.estimate_share_left():.2g} % of the tree left, {left_s:.0f} s at most"
+        progress(f"{gap}, bound {sign * bound:.6g}; {tree.enclosed:,} boxes, {left}")
         if checkpoint is not None and time.perf_counter() - saved > CHECKPOINT_S:
             saved = time.perf_counter()
             tree.time_s, tree.cpu_s = saved - started, time.process_time() - used
@@ -121,7 +123,7 @@ def certify(
 
 def target_cost(cost: float, tolerance: float) -> float:
     """Return the cost to prove as a lower bound."""
-    return cost - tolerance * abs(cost)
+    return cost - tolerance * (abs(cost) or 1.0)
 
 
 def _evaluate_feasible(problem: GaitProblem, x: Array) -> float:

@@ -47,8 +47,8 @@ FEWER = {
 }
 # Run by the gallery alone: they print no number, or those of a sweep, a study and a simulation, which tests of these check.
 GALLERY_ALONE = ("sweep.py", "front.py", "physics_engine.py", "notebook.py", "slider.py", "cluster.py")
-# Three kinds at once, for the page of that name, and a command; not in the gallery.
-WITHOUT_FIGURE = {"bring_your_own.py"}
+# For pages and commands; not in the gallery.
+WITHOUT_FIGURE = {"bring_your_own.py", "welded_beam.py"}
 
 
 def test_no_example_is_forgotten() -> None:

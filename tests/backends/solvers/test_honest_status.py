@@ -34,14 +34,14 @@ def test_a_point_that_is_feasible_but_not_converged_is_called_that() -> None:
     solution = solve(toy(corner), solver=IpoptSettings(tolerance=1e-30))
     assert not solution.converged
     assert solution.best.violation == 0.0
-    assert solution.status == "no start converged; the best feasible one search direction became too small"
+    assert solution.status == "no start converged; ending of the best feasible one: search direction became too small"
 
 
 def test_contradicting_limits_are_called_local_infeasibility() -> None:
     solution = solve(toy(lambda x, y, limit, ops: (x + y, (row(x**2 + y**2, upper=-2 * limit),))))
     assert not solution.converged
     assert (
-        "the least infeasible one converged to a point of local infeasibility; violated: row (by 1 m)"
+        "ending of the least infeasible one: converged to a point of local infeasibility; violated: row (by 1 m)"
         in solution.status
     )
 

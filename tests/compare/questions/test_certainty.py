@@ -64,7 +64,7 @@ def test_gaps_are_measured_from_the_shipped_value_and_not_from_the_best_start() 
     answer = question.add_best_known(evidence)
     assert known.objective is not None
     assert evidence.optima[0].objective < 0.999 * known.objective  # the start ends at another local optimum
-    assert "(shipped, proven to six digits); the optimum found here is 0.1551 % from it" in answer.headline[-1]
+    assert "(shipped, proven to six digits); the optimum found here is 0.16 % from it" in answer.headline[-1]
     assert answer.data["best_known"] == known.objective and answer.data["best_known_source"] == known.source
 
 
