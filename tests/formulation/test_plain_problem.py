@@ -1,4 +1,4 @@
-"""Problems of one's own: three ways to state one are one problem, and what is not allowed is one sentence."""
+"""User-defined problems: three ways to state one are one problem, and what is not allowed is one sentence."""
 
 from pathlib import Path
 from typing import Any
