@@ -6,17 +6,13 @@ import math
 import numpy as np
 import pytest
 
-pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco")
 pytestmark = pytest.mark.slow  # each gait is simulated
 
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import measure  # noqa: E402
 from nlp_gait.simulation.plan import make_plan  # noqa: E402
-from nlp_gait.simulation.simulate import (  # noqa: E402  # noqa: E402
-    Conditions,
-    Push,
-    simulate_plan,  # noqa: E402
-)
+from nlp_gait.simulation.simulate import Conditions, Push, Run, simulate_plan  # noqa: E402
 
 ONE_NEWTON_S = 1.0
 
@@ -72,6 +68,21 @@ def test_a_push_moves_and_a_strong_one_fells(simulated):
     assert pushed.fell_at_s is None
     assert math.degrees(pushed.tilt.max()) > m.largest_tilt_deg + 0.5
     assert simulate_plan(plan, Conditions(push=Push(impulse_Ns=(0.0, 10 * ONE_NEWTON_S)))).fell_at_s is not None
+
+
+def test_a_short_push_changes_the_momentum_by_its_impulse(gait):
+    """In a millisecond the ground's friction cannot give a tenth of it."""
+    run = Run(make_plan(gait("dsp optimum")), Conditions(friction=0.3))
+    run.advance(0.5)
+    assert run.data.ncon > 0 and set(run.data.contact.friction[:, 0].tolist()) == {0.3}
+    momenta = []
+    for impulse in ((0.0, 0.0), (2.0, -1.0)):
+        pushed = run.fork(Push(impulse_Ns=impulse, start_s=run.time_s, duration_s=1e-3))
+        pushed.advance(run.time_s + 1e-3)
+        mujoco.mj_forward(pushed.model, pushed.data)  # velocities after the last step
+        mujoco.mj_subtreeVel(pushed.model, pushed.data)
+        momenta.append(pushed.model.body_subtreemass[0] * pushed.data.subtree_linvel[0, :2])
+    np.testing.assert_allclose(momenta[1] - momenta[0], (2.0, -1.0), rtol=0.1)
 
 
 def test_slope_friction_and_mass_change_the_world(simulated):

@@ -137,6 +137,28 @@ def test_stratified_ranks_are_the_rank_sum_test_in_each_stratum() -> None:
     assert compare_stratified([[1.0, 1.0]], [[1.0, 1.0]]) == (0.5, 1.0)
 
 
+@pytest.mark.parametrize(
+    ("edge", "middle", "p", "a12", "words"),
+    [
+        (0.0, 0.10, 0.5, 0.9, ()),
+        (0.019, 0.10, 0.5, 0.9, ()),
+        (0.03, 0.10, 0.5, 0.9, ("clips: on noise, 3.0 % ",)),
+        (0.0, 0.30, 0.5, 0.9, ("middle",)),
+        (0.0, 0.19, 0.5, 0.9, ()),  # significant, but less than twice the share of a uniform distribution
+        (0.0, 0.10, 1e-3, 0.7, ("gains where the optimum is in the middle of the box (A12 0.70, p 0.001)",)),
+        (0.0, 0.10, 1e-3, 0.6, ()),
+        (0.03, 0.30, 1e-3, 0.7, ("gains", "clips", "middle")),
+    ],
+)
+def test_biases_follow_from_the_measured_shares(
+    edge: float, middle: float, p: float, a12: float, words: tuple[str, ...]
+) -> None:
+    effects = tuple(Effect(change=c, a12=a12 if c == CENTRE else 0.9, p=p) for c in CHANGES)
+    audit = Audit(algorithm="mine", effects=effects, edge=edge, middle=middle, runs=100, evaluations=1000)
+    assert len(audit.accusations) == len(words)
+    assert all(word in sentence for word, sentence in zip(words, audit.accusations, strict=True))
+
+
 def test_verdicts_follow_from_effect_and_test() -> None:
     assert Effect(change="mirrored", a12=0.9, p=0.2).verdict == "invariant"
     assert Effect(change="mirrored", a12=0.9, p=0.001).verdict == "better"

@@ -22,10 +22,20 @@ def mean(samples: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("features", ["free-braking", "regeneration", "heat", "heat,free-braking"])
-def test_power_is_that_of_the_time_histories(features: str) -> None:
-    problem = load("nao-ssp", motors=features)
-    signals = problem.signals(X)
+@pytest.mark.parametrize(
+    ("name", "features"),
+    [
+        ("nao-ssp", "free-braking"),
+        ("nao-ssp", "regeneration"),
+        ("nao-ssp", "heat"),
+        ("nao-ssp", "heat,free-braking"),
+        ("nao-dsp", "heat,free-braking"),
+    ],
+)
+def test_power_is_that_of_the_time_histories(name: str, features: str) -> None:
+    problem = load(name, motors=features)
+    x = X if name == "nao-ssp" else (problem.lower + problem.upper) / 2
+    signals = problem.signals(x)
     torque, rate = signals.arrays["tau"], signals.arrays["qd"]
     driven = torque * rate
     if "free-braking" in features:
@@ -49,7 +59,7 @@ def test_power_is_that_of_the_time_histories(features: str) -> None:
             heat += resistance * (at_motor / k_t) ** 2
     else:
         heat = 0.025 * (torque**2).sum(axis=1)
-    assert evaluated(problem, X).cost == pytest.approx(float(mean(driven.sum(axis=1) + heat)), rel=1e-9)
+    assert evaluated(problem, x).cost == pytest.approx(float(mean(driven.sum(axis=1) + heat)), rel=1e-9)
 
 
 def test_both_are_simulated_with_the_rotors_of_the_plan() -> None:

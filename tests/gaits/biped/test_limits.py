@@ -1,0 +1,70 @@
+"""Rows of limits by hand, on samples small enough to check on paper."""
+
+from types import SimpleNamespace
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import DM, MX
+
+from nlp_gait.formulation import Grid
+from nlp_gait.gaits.biped.body import Body
+from nlp_gait.gaits.biped.goals import INSTEAD
+from nlp_gait.gaits.biped.limits import TorqueChange, compute_margins, make_rows
+from nlp_gait.gaits.biped.support_phases import make_support_box
+from nlp_gait.gaits.nao.body import make_nao
+from nlp_gait.symbolic.nonsmooth import Exact
+from tests.gaits.biped.lopsided import make_lopsided
+
+TORQUE = np.array([[0.0, 1.0, 3.0, 6.0, 10.0], [5.0, 4.0, 2.0, 2.0, 1.0]])
+
+
+def numbers(value: MX) -> np.ndarray:
+    return np.array(ca.evalf(value)).ravel()
+
+
+def make_samples() -> SimpleNamespace:
+    """Two joints at five samples, two for each of two intervals."""
+    grid = Grid(intervals=2, samples_per_interval=2)
+    return SimpleNamespace(
+        grid=grid, joints=("a", "b"), torque=MX(DM(TORQUE)), average=lambda values: values @ DM(grid.weights)
+    )
+
+
+def test_a_torque_changes_over_an_interval_not_over_a_sample() -> None:
+    (row,), indexes = TorqueChange().add({"torque_change_limit_Nm": MX(1.2)}, make_samples(), Exact())
+    assert numbers(row.value) == pytest.approx([3.0, -3.0, 5.0, -2.0, 7.0, -1.0])
+    assert row.labels == ("a, 0", "b, 0", "a, 1", "b, 1", "a, 2", "b, 2")
+    assert numbers(indexes["torque_change_Nm"]) == pytest.approx([7.0])
+
+
+def test_the_goal_torque_is_the_mean_sum_of_squared_torques() -> None:
+    figure = INSTEAD["torque"].figure
+    assert figure is not None
+    squares = (TORQUE**2).sum(axis=0)  # trapezoid: half the weight at both ends
+    assert numbers(figure(make_samples())) == pytest.approx([(squares.sum() - squares[[0, -1]].mean()) / 4])
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("rad", 1.0), ("rad/s", 1.0), ("Nm", 1.0), ("m", 0.01), ("N", 10.0)])
+def test_violations_that_count_alike(unit: str, scale: float) -> None:
+    assert make_rows("row", unit, MX(0.0), MX(0.0), size=2.0).scale == 2.0 * scale
+
+
+def test_margins_are_distances_to_the_edges_of_a_sole_that_is_not_symmetric() -> None:
+    """From an ankle at (1, 2): 0.02 m behind the front, 0.01 m inside the right edge; then 0.03 m outside the left one."""
+    body = make_lopsided(make_nao("nao-v5"))
+    foot = body.robot.feet["left"]
+    zmp = MX(DM([[1.0 + foot.front_m - 0.02, 1.0], [2.0 - foot.right_m + 0.01, 2.0 + foot.left_m + 0.03]]))
+    along, across = (numbers(margin) for margin in Body.make_sole_margins(body, (1.0, 2.0))(zmp, {}, Exact()))
+    assert along == pytest.approx([0.02, min(foot.front_m, foot.back_m)])
+    assert across == pytest.approx([0.01, -0.03])
+
+
+def test_the_box_around_both_soles_ends_at_their_outer_edges() -> None:
+    body = make_lopsided(make_nao("nao-v5"))
+    left, right = body.robot.feet["left"], body.robot.feet["right"]
+    box = make_support_box(body.robot, {"L": (0.0, 0.05), "R": (0.06, -0.05)})
+    assert box == pytest.approx((-left.back_m, 0.06 + right.front_m, -0.05 - right.right_m, 0.05 + left.left_m))
+    assert numbers(compute_margins(box, MX(DM([[0.0], [0.0]])), Exact())[1]) == pytest.approx(
+        [min(0.05 + left.left_m, 0.05 + right.right_m)]
+    )
