@@ -23,6 +23,7 @@ LAYERS = (
     "nlp_gait.notebook",
     "nlp_gait.decoding",
     "nlp_gait.progress",
+    "nlp_gait.option_groups",
     "nlp_gait.user_code",
     "nlp_gait.robots",
     "nlp_gait.symbolic",

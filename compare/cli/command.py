@@ -14,7 +14,6 @@ import select
 import sys
 from collections.abc import Callable, Container, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,6 +23,7 @@ from compare.cli.printing import Output, fail, print_output, say_error
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import check_output, protect_inputs
 from nlp_gait.interrupts import raise_interrupts
+from nlp_gait.option_groups import find_groups, list_options, pack_options, set_options
 
 # In the annotation of a parameter that names the folder, the file, or either, that the command writes.
 OUTPUT, OUTPUT_FILE, OUTPUT_OF_ANY_KIND = "output", "output file", "output of any kind"
@@ -56,13 +56,13 @@ NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 def command(function: Callable[..., Output]) -> Callable[..., None]:
     """Make a function a Typer command: groups become options, and its output is printed; expected errors are one sentence."""
-    options = [*_list_options(function), JSON]
+    listed = list_options(function).values()
+    options = [*(option.replace(kind=inspect.Parameter.KEYWORD_ONLY) for option in listed), JSON]
     files = [option.name for option in options if OUTPUT_FILE in get_marks(option)]
     outputs = {option.name for option in options if get_marks(option) & {OUTPUT, OUTPUT_FILE, OUTPUT_OF_ANY_KIND}}
     if any(get_marks(option) & {OUTPUT_FILE, OUTPUT_OF_ANY_KIND} for option in options):
         options.append(FORCE)
-    parameters = inspect.signature(function, eval_str=True).parameters.values()
-    groups: dict[str, Any] = {p.name: p.annotation for p in parameters if is_dataclass(p.annotation)}
+    groups = find_groups(function)
 
     @functools.wraps(function)
     def run(**given: Any) -> None:
@@ -74,9 +74,7 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
                 for name in files:
                     if given[name] is not None:
                         check_output_file(given[name])
-                for name, group in groups.items():
-                    given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
-                output = function(**given)
+                output = function(**pack_options(groups, given))
                 print_output(output, as_json)
                 sys.stdout.flush()  # report a failed write here, not at the interpreter's exit
             for sentence in output.failures:
@@ -98,8 +96,7 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
                 raise
             fail(str(error))
 
-    run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
-    run.__annotations__ = {option.name: option.annotation for option in options}
+    set_options(run, options)
     return run
 
 
@@ -141,15 +138,6 @@ def _find_inputs(given: Mapping[str, Any], outputs: Container[str]) -> Iterator[
                 with suppress(OSError, ValueError):  # a name that is too long, or none
                     if candidate and Path(candidate).is_file():
                         yield Path(candidate)
-
-
-def _list_options(function: Callable[..., Any]) -> Iterator[inspect.Parameter]:
-    """Yield the parameters of a function or group as options; a group stands for its fields."""
-    for parameter in inspect.signature(function, eval_str=True).parameters.values():
-        if is_dataclass(parameter.annotation) and isinstance(parameter.annotation, type):
-            yield from _list_options(parameter.annotation)
-        else:
-            yield parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
 
 
 def get_marks(option: inspect.Parameter) -> set[object]:

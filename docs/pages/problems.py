@@ -16,9 +16,10 @@ from docs.difficulty import Best, Difficulty, Reached, difficulties
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem, list_problems, load
-from nlp_gait.formulation.registry import find_maker, find_option_groups
+from nlp_gait.formulation.registry import find_maker
 from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaitbench.facts import DEFINITIONS, load_facts
+from nlp_gait.option_groups import find_groups
 from nlp_gait.proofs.certificate import load_certificates
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -315,7 +316,7 @@ def list_options(problems: Sequence[GaitProblem]) -> str:
 def _option_words(problem: GaitProblem) -> Iterator[tuple[str, str]]:
     """Return the meaning of options, from the docstrings of the maker and of the classes that declare them."""
     make = find_maker(problem.name)
-    groups = find_option_groups(make).values()
+    groups = find_groups(make).values()
     for declared in (make, *(kind for group in groups for kind in reversed(inspect.getmro(group)))):
         for name, words in ARGUMENT.findall(inspect.cleandoc(declared.__doc__ or "")):
             yield name, " ".join(words.split()).rstrip(".")

@@ -6,7 +6,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -20,6 +20,7 @@ from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import is_number
 from nlp_gait.formulation.plain_problem import name_problem
+from nlp_gait.option_groups import find_groups, list_options, pack_options, set_options
 from nlp_gait.providers import PROBLEMS, import_object
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -37,9 +38,7 @@ def maker(make: Maker) -> Maker:
     The function's signature is the only list of the options; an argument annotated with a data class stands for its fields. An
     option annotated with a ``Literal`` takes its values only. The problem is refined by the option that its grid names.
     """
-    groups = find_option_groups(make)
-    listed = [inspect.signature(kind).parameters for kind in groups.values()] or [inspect.signature(make).parameters]
-    parameters = {name: option for options in listed for name, option in options.items()}
+    groups, parameters = find_groups(make), list_options(make)
 
     @lock_casadi
     @functools.wraps(make)
@@ -47,9 +46,8 @@ def maker(make: Maker) -> Maker:
         options = {name: _to_python(value) for name, value in options.items()}
         check_options(make_problem, options)
         call = {name: option.default for name, option in parameters.items()} | options
-        given = {name: kind(**{f.name: call[f.name] for f in fields(kind)}) for name, kind in groups.items()}
         files = hash_files(call)
-        problem = make(**(given or call))
+        problem = make(**pack_options(groups, call))
         if hash_files(call) != files:
             raise InputError(f"a file of {make.__name__.replace('_', '-')} changed while it was read; load it again")
         if not isinstance(problem, GaitProblem):
@@ -65,16 +63,9 @@ def maker(make: Maker) -> Maker:
             problem = replace(problem, refine=lambda factor: make_problem(**{**call, refined_by: count * factor}))
         return problem.with_origin(make_problem, call)
 
-    make_problem.__signature__ = inspect.Signature(list(parameters.values()))  # type: ignore[attr-defined]
-    make_problem.__annotations__ = {k: v for kind in groups.values() or [make] for k, v in get_type_hints(kind).items()}
+    set_options(make_problem, [*parameters.values()])
     make_problem.checks_options = True  # type: ignore[attr-defined]
     return make_problem
-
-
-def find_option_groups(make: Maker) -> dict[str, Any]:
-    """Return the data classes whose fields are a maker's options, by argument; none if its arguments are the options."""
-    hints: dict[str, Any] = get_type_hints(inspect.unwrap(make))
-    return {name: hint for name, hint in hints.items() if hasattr(hint, "__dataclass_fields__") and name != "return"}
 
 
 def list_problems() -> tuple[str, ...]:
