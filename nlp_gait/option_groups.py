@@ -30,7 +30,7 @@ def pack_options(groups: Mapping[str, Any], values: Mapping[str, Any]) -> dict[s
     return arguments
 
 
-def set_options(function: Any, options: Sequence[inspect.Parameter]) -> None:
+def replace_signature(function: Any, options: Sequence[inspect.Parameter]) -> None:
     """Give a function that takes any keywords the signature of these options."""
     function.__signature__ = inspect.Signature(list(options))
     function.__annotations__ = {option.name: option.annotation for option in options}

@@ -23,7 +23,7 @@ from compare.cli.printing import Output, fail, print_output, say_error
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import check_output, protect_inputs
 from nlp_gait.interrupts import raise_interrupts
-from nlp_gait.option_groups import find_groups, list_options, pack_options, set_options
+from nlp_gait.option_groups import find_groups, list_options, pack_options, replace_signature
 
 # In the annotation of a parameter that names the folder, the file, or either, that the command writes.
 OUTPUT, OUTPUT_FILE, OUTPUT_OF_ANY_KIND = "output", "output file", "output of any kind"
@@ -96,7 +96,7 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
                 raise
             fail(str(error))
 
-    set_options(run, options)
+    replace_signature(run, options)
     return run
 
 

@@ -20,7 +20,7 @@ from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import is_number
 from nlp_gait.formulation.plain_problem import name_problem
-from nlp_gait.option_groups import find_groups, list_options, pack_options, set_options
+from nlp_gait.option_groups import find_groups, list_options, pack_options, replace_signature
 from nlp_gait.providers import PROBLEMS, import_object
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -63,7 +63,7 @@ def maker(make: Maker) -> Maker:
             problem = replace(problem, refine=lambda factor: make_problem(**{**call, refined_by: count * factor}))
         return problem.with_origin(make_problem, call)
 
-    set_options(make_problem, [*parameters.values()])
+    replace_signature(make_problem, [*parameters.values()])
     make_problem.checks_options = True  # type: ignore[attr-defined]
     return make_problem
 
