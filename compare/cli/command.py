@@ -48,6 +48,7 @@ def _add_flag(name: str, flag: str, words: str, *marks: str) -> inspect.Paramete
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=annotation)
 
 
+CONTEXT = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
 JSON = _add_flag("as_json", "--json", "Print one JSON object.", SESSION)
 FORCE = _add_flag("force", "--force", "Replace files that exist.")
 # Errors of the system if a file cannot grow.
@@ -62,14 +63,18 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
     outputs = {option.name for option in options if get_marks(option) & {OUTPUT, OUTPUT_FILE, OUTPUT_OF_ANY_KIND}}
     if any(get_marks(option) & {OUTPUT_FILE, OUTPUT_OF_ANY_KIND} for option in options):
         options.append(FORCE)
+    adds_context = not any(option.annotation is typer.Context for option in options)
+    options += [CONTEXT] * adds_context
     groups = find_groups(function)
 
     @functools.wraps(function)
     def run(**given: Any) -> None:
-        as_json = given.pop("as_json")
+        as_json, context = given.pop("as_json"), given["context"]
+        if adds_context:
+            del given["context"]
         try:
             with raise_interrupts():
-                _check_numbers(given)
+                _check_values(context, given)
                 protect_inputs(_find_inputs(given, outputs), given.pop("force", False))
                 for name in files:
                     if given[name] is not None:
@@ -100,11 +105,17 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
     return run
 
 
-def _check_numbers(given: Mapping[str, Any]) -> None:
-    """Raise InputError for an option that is NaN, which is within every range."""
+def _check_values(context: typer.Context, given: Mapping[str, Any]) -> None:
+    """Raise InputError for an option that is NaN, which is within every range, or an empty text, which is no value."""
     for name, value in given.items():
         if isinstance(value, float) and math.isnan(value):
             raise InputError(f"--{name.replace('_', '-')} must be a finite number, got nan")
+        source = context.get_parameter_source(name)
+        texts = value if isinstance(value, (list, tuple)) else [value]
+        is_empty = any(isinstance(text, str) and not text.strip() for text in texts)
+        if is_empty and source is not None and source.name == "COMMANDLINE":
+            option = next(parameter.opts[0] for parameter in context.command.params if parameter.name == name)
+            raise InputError(f"{option} is an empty text; give a value, or leave it out (is a shell variable not set?)")
 
 
 def check_output_file(path: Path) -> Path:

@@ -133,9 +133,9 @@ def parse_names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
-def parse_numbers(name: str, text: str, flag: str) -> list[float]:
+def parse_numbers(name: str, text: str, flag: str, *, least: float = -LARGEST, most: float = LARGEST) -> list[float]:
     """Return comma-separated numbers; raises as ``parse_number``."""
-    return [parse_number(name, word, flag) for word in text.split(",")]
+    return [parse_number(name, word, flag, least=least, most=most) for word in text.split(",")]
 
 
 def parse_number(name: str, text: str, flag: str, *, least: float = -LARGEST, most: float = LARGEST) -> float:

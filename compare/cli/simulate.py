@@ -78,7 +78,7 @@ class ConditionOptions:
         from nlp_gait.simulation.mjcf import Bumps
         from nlp_gait.simulation.simulate import Conditions, Push
 
-        slope = parse_numbers("a slope", self.slope_deg, "--slope-deg")
+        slope = parse_numbers("a slope", self.slope_deg, "--slope-deg", least=-45.0, most=45.0)
         if len(slope) != 2:
             raise InputError(f"--slope-deg takes X,Y, got {self.slope_deg!r}")
         push = None

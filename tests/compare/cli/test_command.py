@@ -24,7 +24,14 @@ class Fruit:
 
 
 @command
-def weigh(*, count: Annotated[int, typer.Option(min=1)] = 1, fruit: Fruit, loud: bool = False) -> None:
+def weigh(
+    *,
+    count: Annotated[int, typer.Option(min=1)] = 1,
+    fruit: Fruit,
+    loud: bool = False,
+    box: Annotated[str, typer.Option()] = "",
+    labels: Annotated[list[str] | None, typer.Option("--label")] = None,
+) -> None:
     """Weigh some fruit."""
     print(f"{count * fruit.weight_g:g} g of {fruit.name}" + "!" * loud)
 
@@ -40,6 +47,13 @@ MARKET.command()(weigh)
         (["plum", "--weight", "heavy"], 2, "Invalid value for '--weight'"),
         (["plum", "--weight", "-1"], 1, "nlp-gait: --weight must be positive, got -1.0\n"),
         (["plum", "--weight", "nan"], 1, "nlp-gait: --weight-g must be a finite number, got nan\n"),
+        (
+            ["plum", "--box", ""],
+            1,
+            "nlp-gait: --box is an empty text; give a value, or leave it out (is a shell variable",
+        ),
+        (["plum", "--label", "ripe", "--label", " "], 1, "nlp-gait: --label is an empty text"),
+        ([""], 1, "name is an empty text"),
     ],
 )
 def test_a_group_refuses_as_a_command_does(arguments: list[str], status: int, words: str) -> None:
