@@ -55,7 +55,7 @@ def list_powers(found):
 
 def compare_searches(found):
     pso, ga = ([run.objective for run in found.runs[found.spec.title, search]] for search in SEARCHES)
-    return Found(np.median(ga) - np.median(pso), p=approximate_rank_sum(pso, ga).p_two_sided)
+    return Found(np.median(ga) - np.median(pso), p=approximate_rank_sum(pso, ga))
 
 
 # %%

@@ -130,13 +130,6 @@ class Comparison:
         """Why no difference can be significant, see ``describe_power``; empty if one can."""
         return describe_power([len(solver.records) for solver in self.solvers])
 
-    @property
-    def leaders(self) -> set[str]:
-        """Solver with the best median and those that do not differ from it significantly; empty without any test."""
-        leader = self.solvers[0].name
-        results = self.compare_with_others(leader)
-        return {leader, *(solver for solver, result in results.items() if result == 0)} if results else set()
-
     def compare_with_others(self, solver: str) -> dict[str, int]:
         """Return 1, 0 or -1 by the name of each other solver: this one is significantly better, not different, or worse."""
         results: dict[str, int] = {}

@@ -28,22 +28,23 @@ def write_headline(comparison: Comparison) -> str:
     """Return who ends how far from which value, in at most two sentences."""
     if not any(solver.feasible for solver in comparison.solvers):
         return _describe_infeasible_study(comparison)
-    if len(comparison.records) == 1:
-        return _describe_single_run(comparison)
+    if len(comparison.records) == 1 and comparison.known.objective is None:
+        value = with_unit(comparison.reference, comparison.objective.unit)
+        return f"The only {comparison.solvers[0].title} run ends at {value}; no best known value is shipped."
     gaps = [(solver, comparison.gap(solver.median_cost)) for solver in _choose_named(comparison)]
     away = [(solver, gap) for solver, gap in gaps if FOUND < gap < math.inf or gap < 0.0]
     reaching = [solver for solver, gap in gaps if 0.0 <= gap <= FOUND]
     clauses = [_describe_failing(solver) for solver, gap in gaps if gap == math.inf]
     if reaching:
+        first, *others = reaching
         best = "it" if away else _name_reference(comparison)
-        clauses.insert(0, ", ".join(_describe_reaching(comparison, k, best) for k in _mark_first(reaching)))
+        texts = [f"{first.title} reaches {best} {_count_reaching(comparison, first)}"]
+        clauses.insert(0, ", ".join([*texts, *(f"{s.title} {_count_reaching(comparison, s)}" for s in others)]))
     if away:
         clauses.insert(0, _describe_away(comparison, away))
-    others = len(comparison.solvers) - len(gaps)
-    if others:
-        clauses.append(f"and {others} more: see the table")
-    sentence = "; ".join(clauses[:-1] if others else clauses) + (f", {clauses[-1]}" if others else "")
-    return " ".join(filter(None, (f"{sentence[:1].upper()}{sentence[1:]}.", _write_second(comparison))))
+    more = len(comparison.solvers) - len(gaps)
+    sentence = "; ".join(clauses) + (f", and {more} more: see the table." if more else ".")
+    return " ".join(filter(None, (sentence, _write_second(comparison))))
 
 
 def _choose_named(comparison: Comparison) -> list[SolverRuns]:
@@ -54,52 +55,27 @@ def _choose_named(comparison: Comparison) -> list[SolverRuns]:
 
 
 def _describe_infeasible_study(comparison: Comparison) -> str:
-    """Return why no run of any solver has a feasible point."""
+    """Return whose runs are all infeasible, and how many failed."""
     names = [solver.title for solver in comparison.solvers[:NAMED]]
     more = len(comparison.solvers) - len(names)
-    solvers = f"{', '.join(names)} and {more} more" if more else join_words(names)
-    failed = sum(not record.x for record in comparison.records)
-    runs = len(comparison.records)
+    solvers = join_words([*names, f"{more} more"] if more else names)
+    failed, runs = sum(not record.x for record in comparison.records), len(comparison.records)
     of_them = "" if not failed else f", and {failed} of them failed" if failed < runs else ": each failed"
-    count = "The only run" if runs == 1 else f"None of the {runs} runs"
-    verb = "is not feasible" if runs == 1 else "is feasible"
-    known = f" The {_name_value(comparison)}." if comparison.known.objective is not None else ""
-    return f"{count} of {solvers} {verb}{of_them}.{known}"
-
-
-def _describe_single_run(comparison: Comparison) -> str:
-    """Return the value of the only run, and its distance from the best known one if that is shipped."""
-    (solver,) = comparison.solvers
-    value = with_unit(comparison.value(solver.costs[0]), comparison.objective.unit)
-    if comparison.known.objective is None:
-        return f"The only {solver.title} run ends at {value}; no best known value is shipped to compare it with."
-    gap = comparison.gap(solver.costs[0])
-    where = "reaches" if 0.0 <= gap <= FOUND else f"ends {_format_distance(comparison, gap)}"
-    text = f"The only {solver.title} run {where} {_name_reference(comparison)}."
-    return " ".join(filter(None, (text, describe_better(comparison))))
-
-
-def _name_value(comparison: Comparison) -> str:
-    kind, value = _split_reference(comparison)
-    return f"{kind} is {value}"
+    if runs == 1:
+        return f"The only run, of {solvers}, {'failed' if failed else 'is infeasible'}."
+    return f"None of the {runs} runs of {solvers} is feasible{of_them}."
 
 
 def _name_reference(comparison: Comparison) -> str:
-    kind, value = _split_reference(comparison)
-    return f"the {kind} ({value})" if comparison.known.objective is None else f"the {kind} of {value}"
-
-
-def _split_reference(comparison: Comparison) -> tuple[str, str]:
-    """Return what the value is from which gaps are measured, and the value."""
-    known, unit = comparison.known, comparison.objective.unit
-    value = with_unit(comparison.reference, unit)
+    """Return the value from which gaps are measured, and what is proven."""
+    known, value = comparison.known, with_unit(comparison.reference, comparison.objective.unit)
     if known.objective is None:
-        return "best value found", value
+        return f"the best value found ({value})"
     if known.bound is None:
-        return "best known value", value
+        return f"the best known value of {value}"
     if abs(known.bound - comparison.reference) <= SIX_DIGITS * (abs(comparison.reference) or 1.0):
-        return "proven optimum", value
-    return "best known value", f"{value} (proven within {describe_gap(known.bound, comparison.reference)})"
+        return f"the proven optimum of {value}"
+    return f"the best known value of {value} (proven within {describe_gap(known.bound, comparison.reference)})"
 
 
 def _format_distance(comparison: Comparison, gap: float) -> str:
@@ -108,15 +84,12 @@ def _format_distance(comparison: Comparison, gap: float) -> str:
     return f"{comparison.format_gap(abs(gap))} {'above' if is_above else 'below'}"
 
 
-def _mark_first(solvers: Sequence[SolverRuns]) -> list[tuple[SolverRuns, bool]]:
-    return [(solver, k == 0) for k, solver in enumerate(solvers)]
-
-
 def _describe_away(comparison: Comparison, away: Sequence[tuple[SolverRuns, float]]) -> str:
     """Return how far the medians are from the best value; the order of neighbours that a test does not find is uncertain."""
     (first, gap), *others = away
-    run = f"the median {first.title} run" if len(first.records) > 1 else f"the only {first.title} run"
-    words = [f"{run} ends {_format_distance(comparison, gap)} {_name_reference(comparison)}"]
+    which = "median" if len(first.records) > 1 else "only"
+    distance = f"{_format_distance(comparison, gap)} {_name_reference(comparison)}"
+    words = [f"The {which} {first.title} run ends {distance}"]
     before = first
     for solver, gap in others:
         word = f"{solver.title} {comparison.format_gap(abs(gap))}"
@@ -126,16 +99,14 @@ def _describe_away(comparison: Comparison, away: Sequence[tuple[SolverRuns, floa
     return ", ".join(words)
 
 
-def _describe_reaching(comparison: Comparison, solver_and_first: tuple[SolverRuns, bool], best: str) -> str:
-    solver, is_first = solver_and_first
+def _count_reaching(comparison: Comparison, solver: SolverRuns) -> str:
+    """Return for example ``from all 20 starts``."""
     reached, runs = comparison.count_reached(solver), len(solver.records)
-    noun = "start" if solver.is_gradient else "run"
+    place, noun = ("from", "start") if solver.is_gradient else ("in", "run")
     if runs == 1:
-        how = f"in its only {noun}"
-    else:
-        count = f"{reached} of {runs}" if reached < runs else "both" if runs == 2 else f"all {runs}"
-        how = f"{'from' if solver.is_gradient else 'in'} {count} {noun}s"
-    return f"{solver.title} {f'reaches {best} ' if is_first else ''}{how}"
+        return f"in its only {noun}"
+    count = f"{reached} of {runs}" if reached < runs else "both" if runs == 2 else f"all {runs}"
+    return f"{place} {count} {noun}s"
 
 
 def _describe_failing(solver: SolverRuns) -> str:

@@ -6,6 +6,10 @@ from dataclasses import dataclass
 
 from compare.analysis.comparison import Comparison, index_solvers
 from compare.analysis.record_statistics import SIGNIFICANT, tie
+from compare.analysis.units import name_solver
+
+# Of a solver than which the subject is significantly better, from which it does not differ, or than which it is worse.
+MARKS = {1: "+", 0: "=", -1: "-"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +71,36 @@ def count_wins(comparisons: Sequence[Comparison], solver: str) -> list[Score]:
 def list_user_solvers(comparisons: Sequence[Comparison]) -> list[str]:
     """Return the names of solvers that are the user's own."""
     return list(dict.fromkeys(s.name for c in comparisons for s in c.solvers if s.is_user_defined))
+
+
+def tabulate_problems(comparisons: Sequence[Comparison]) -> tuple[str, list[tuple[str, ...]]]:
+    """Return a solver, and a header and rows: median gaps on each problem, marked by the test of this solver against each other.
+
+    It is the first of the user's solvers, else that with the best mean rank. The last rows count the marks, and give mean ranks.
+    """
+    ranks = rank_over_problems(comparisons).mean_ranks
+    by_name, _ = index_solvers(comparisons)
+    names = list(dict.fromkeys([*ranks, *(name for solvers in by_name for name in solvers)]))
+    subject = [*list_user_solvers(comparisons), *names][0]
+    rows = [("problem", *map(name_solver, names))]
+    for comparison, solvers in zip(comparisons, by_name, strict=True):
+        marks = {name: MARKS[result] for name, result in comparison.compare_with_others(subject).items()}
+        gaps = {name: comparison.gap(solver.median_cost) for name, solver in solvers.items()}
+        cells = {n: comparison.format_gap(gap) if math.isfinite(gap) else "infeasible" for n, gap in gaps.items()}
+        rows.append((comparison.problem, *(f"{cells.get(name, '-')} {marks.get(name, '')}".strip() for name in names)))
+    scores = {score.other: f"{score.wins}/{score.ties}/{score.losses}" for score in count_wins(comparisons, subject)}
+    rows.append(("wins/ties/losses", *(scores.get(name, "-") for name in names)))
+    rows.append(("mean rank", *(f"{ranks[name]:.2f}" if name in ranks else "-" for name in names)))
+    return name_solver(subject), rows
+
+
+def explain_marks(subject: str) -> str:
+    """Return what the marks of ``tabulate_problems`` mean."""
+    return (
+        f"Median gap to the best known value. {subject} is significantly better (+), worse (-) or not different (=): two-sided "
+        f"rank-sum test at {SIGNIFICANT:g}, Holm-corrected over all pairs on the problem. Ranks are those of the medians, of "
+        "solvers that ran on all problems."
+    )
 
 
 def describe_tests(ranking: Ranking) -> str:

@@ -14,7 +14,7 @@ from compare.bench.baseline import EVALUATIONS, get_reference, load_baseline
 from compare.drawing.comparison_figures import make_ecdf_charts
 from compare.report.document import Document, Section, Table, make_text_table
 from compare.report.provenance import TERMS
-from compare.report.study_sections import make_chart_figure, make_wins_table
+from compare.report.study_sections import make_chart_figure
 from compare.study.record import RunRecord
 from nlp_gait import gaitbench
 
@@ -103,7 +103,6 @@ def make_leaderboard_page(
                 "31 targets, from 100 % to 1e-4 % above the best known.",
                 make_ecdf_charts(board.comparisons, per_variable=True),
             ),
-            *(() if solver is None else (make_wins_table(board.comparisons, solver),)),
             Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),
             Section(
                 title="How it was measured",

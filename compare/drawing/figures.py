@@ -6,7 +6,7 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -38,7 +38,6 @@ MARKERS = ("o", "s", "^", "D")
 # Ink of axes and text in figures inside a page: replaced by the page's own colour there.
 INK = "#000000"
 LEGS = {"left": "#7A5CC0", "right": "#A07D1C", "trunk": INK}  # unlike those of solvers
-LEGEND_ROW_IN = 0.19
 SUPERSCRIPTS = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
 
 
@@ -103,17 +102,6 @@ def make_axes(width_in: float, height_in: float = 3.0) -> tuple[Figure, Axes]:
     return figure, figure.subplots()
 
 
-def add_legend_below(figure: Figure) -> None:
-    """Add the legend of the first axes below the figure, which grows accordingly."""
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    if not labels:
-        return
-    letters = 14 * figure.get_figwidth()  # in a row at the legend's size
-    columns = max(1, min(len(labels), int(letters / (max(map(len, labels)) + 8))))
-    figure.set_figheight(figure.get_figheight() + LEGEND_ROW_IN * -(-len(labels) // columns))
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
-
-
 def format_power_of_ten(value: float) -> str:
     """Format a power of ten: 10\u207b\u2074, 1, 10, 10\u00b2."""
     exponent = round(math.log10(value))
@@ -150,12 +138,3 @@ def inline_svg(svg: str, prefix: str, title: str) -> str:
     svg = svg.replace("fill: #ffffff", "fill: none").replace(INK, "currentColor").replace("#d0d0d0", "var(--grid)")
     # Text without a fill is black by default, in a dark page too.
     return svg.replace("<svg ", f'<svg role="img" aria-label="{title}" fill="currentColor" ', 1)
-
-
-def mark_values(
-    axes: Axes, values: Sequence[float], label: str, marker: str = "x", colour: str = "0.4", height: float = 0.03
-) -> None:
-    """Mark values of x at a share of the axes' height."""
-    if values:
-        transform = axes.get_xaxis_transform()
-        axes.plot(values, [height] * len(values), marker, color=colour, label=label, transform=transform)

@@ -23,18 +23,23 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from compare.analysis.best_known import compute_gap
+from compare.analysis.record_statistics import find_best_known
+from compare.analysis.units import format_percent, with_unit
 from compare.drawing.figures import use_style
 from compare.papers.paper_runs import Effort, Runner, tabulate, tabulate_runs
 from compare.papers.rules import ClaimRow, Found, Ruling, decide, describe
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, make_text_table
-from compare.report.provenance import TERMS, format_settings, make_reference_table, make_solver_table
+from compare.report.provenance import TERMS, format_settings, make_solver_table
 from compare.report.writing import make_citation_section, make_own_version_table, write_document
-from compare.study.record import format_now, list_versions
+from compare.study.record import RunRecord, format_now, group_by, list_versions
+from compare.study.references import find_reference
+from nlp_gait.backends.identity import hash_json, make_key
 from nlp_gait.files import make_writable_folder, write_json
 
 E = TypeVar("E", bound=Effort)
@@ -301,3 +306,19 @@ def encode_part(part: Part) -> dict[str, Any]:
 def _add_unit(claim: ClaimRow) -> str:
     unit = "" if claim.parts[0] == "p <" else claim.unit  # which is that of the lead
     return f"{claim.printed} {unit}".strip() if claim.printed else ""
+
+
+def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
+    """Return the best of the records next to the shipped best known value, a row for each problem that has one."""
+    rows = []
+    for group in group_by(records, lambda record: hash_json(make_key(record.inputs.problem))).values():
+        reference, objective = find_reference(group[0].inputs.problem), group[0].inputs.objective
+        best = find_best_known(group)
+        if reference.objective is not None:
+            gap = format_percent(compute_gap(best, reference.objective, objective))
+            values = (with_unit(value, objective.unit) for value in (best, reference.objective))
+            rows.append((group[0].problem, *values, gap, reference.source))
+    if not rows:
+        return "No best known value is shipped for the settings of these runs; gaps are relative to the best of them."
+    header = ("problem", "best of these runs", "best known", "gap", "source of the best known value")
+    return make_text_table(header, rows, "Best known values", prose=True)

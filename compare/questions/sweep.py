@@ -12,9 +12,9 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import format_quantity, list_units, make_axis_label, with_unit
-from compare.drawing.figures import COLOURS, make_axes, mark_values, use_style
+from compare.drawing.figures import COLOURS, make_axes, use_style
 from compare.questions.question import Answer, Question, Work, make_record_table
-from compare.questions.swept_walks import COST, SweepPoint, check_cycle, report_walks, simulate_walk
+from compare.questions.swept_walks import COST, SweepPoint, check_cycle, mark_values, report_walks, simulate_walk
 from compare.report.document import Figure, make_text_table
 from compare.study.references import find_reference
 from compare.study.run import IPOPT, describe_problem

@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import format_millimetres, list_units, make_axis_label, name_in_words, with_unit
-from compare.drawing.figures import make_figure, mark_values, use_style
+from compare.drawing.figures import make_figure, use_style
 from compare.questions.question import Work, make_table
 from compare.report.document import Figure, Part
 from nlp_gait.backends.identity import identify_problem
@@ -168,3 +169,12 @@ def plot_costs(points: Sequence[SweepPoint], problem: GaitProblem) -> Drawing:
         for axes in (cost, lengths, times):
             axes.set_ylim(bottom=0.0)
     return figure
+
+
+def mark_values(
+    axes: Axes, values: Sequence[float], label: str, marker: str = "x", colour: str = "0.4", height: float = 0.03
+) -> None:
+    """Mark values of x at a share of the axes' height."""
+    if values:
+        transform = axes.get_xaxis_transform()
+        axes.plot(values, [height] * len(values), marker, color=colour, label=label, transform=transform)

@@ -1,13 +1,14 @@
 """Tables of a study for papers, in LaTeX with the package booktabs: one of each problem, and one of problems and solvers."""
 
 import math
+import re
 from collections.abc import Sequence
 from statistics import mean, median, stdev
 
-from compare.analysis.comparison import Comparison, index_solvers
-from compare.analysis.overview import count_wins, list_user_solvers, rank_over_problems
+from compare.analysis.comparison import Comparison
+from compare.analysis.overview import explain_marks, tabulate_problems
 from compare.analysis.record_statistics import SIGNIFICANT
-from compare.analysis.units import join_words, make_heading, name_solver, with_unit
+from compare.analysis.units import join_words, make_heading, with_unit
 from nlp_gait.files import make_file_name
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
@@ -16,8 +17,7 @@ SPECIAL = str.maketrans(
     {c: rf"\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}", "\\": r"\textbackslash{}", "<": "$<$"}
 )
 UNKNOWN = "--"
-# Of a solver than which the subject is significantly better, from which it does not differ, or than which it is worse.
-MARKS = {1: "$+$", 0: "$=$", -1: "$-$"}
+MARK = re.compile(r" ([-+=])$")
 LEAST_DECIMALS, MOST_DECIMALS = 4, 10
 
 
@@ -46,30 +46,10 @@ def format_latex_table(comparison: Comparison, decimals: int | None = None) -> s
 
 
 def format_latex_overview(comparisons: Sequence[Comparison]) -> str:
-    """Return the table of problems and solvers: median gaps, marked by the test against the first of the user's solvers.
-
-    Without one, the solver with the best mean rank takes its place. The last rows count the marks and give mean ranks.
-    """
-    ranks = rank_over_problems(comparisons).mean_ranks
-    by_name, _ = index_solvers(comparisons)
-    names = list(dict.fromkeys([*ranks, *(name for solvers in by_name for name in solvers)]))
-    subject = [*list_user_solvers(comparisons), *names][0]
-    rows = []
-    for comparison, solvers in zip(comparisons, by_name, strict=True):
-        marks = {name: MARKS[result] for name, result in comparison.compare_with_others(subject).items()}
-        gaps = {name: _format_gap(comparison, comparison.gap(s.median_cost)) for name, s in solvers.items()}
-        cells = [f"{gaps.get(name, UNKNOWN)} {marks.get(name, '')}".strip() for name in names]
-        rows.append((escape_latex(comparison.problem), *cells))
-    scores = {score.other: f"{score.wins}/{score.losses}/{score.ties}" for score in count_wins(comparisons, subject)}
-    rows.append((r"\midrule $+$/$-$/$=$", *(scores.get(name, UNKNOWN) for name in names)))
-    rows.append(("mean rank", *(f"{ranks[name]:.2f}" if name in ranks else UNKNOWN for name in names)))
-    caption = (
-        f"Median gap to the best known value. {name_solver(subject)} is significantly better ($+$), worse ($-$) or not "
-        f"different ($=$): two-sided rank-sum test at {SIGNIFICANT:g}, Holm-corrected over all pairs on the problem. "
-        "Ranks are those of the medians, of solvers that ran on all problems."
-    )
-    text = escape_latex(caption).replace(r"\$", "$")
-    return _format_table(text, "problems", ("problem", *map(escape_latex, map(name_solver, names))), rows)
+    """Return the table of problems and solvers, see ``compare.analysis.overview.tabulate_problems``."""
+    subject, rows = tabulate_problems(comparisons)
+    header, *body = [[MARK.sub(r" $\1$", escape_latex(cell)) for cell in row] for row in rows]
+    return _format_table(escape_latex(explain_marks(subject)), "problems", header, body)
 
 
 def _format_table(caption: str, label: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -1,16 +1,11 @@
-"""Where numbers come from: settings and seeds of solvers, shipped best known values."""
+"""Where numbers come from: terms, settings and seeds of solvers."""
 
 import json
 from collections.abc import Iterable
 
-from compare.analysis.best_known import compute_gap
-from compare.analysis.record_statistics import find_best_known
-from compare.analysis.units import format_percent, with_unit
 from compare.report.document import Prose, Table, make_text_table
 from compare.study.description import describe_solver, list_described_names
 from compare.study.record import RunRecord, group_by
-from compare.study.references import find_reference
-from nlp_gait.backends.identity import hash_json, make_key
 
 # The one explanation of each term: of a column by its heading, and in the glossary at the end of a page.
 GLOSSARY = {
@@ -45,22 +40,6 @@ def make_solver_table(records: Iterable[RunRecord]) -> Table:
         rows.append((solver, describe_budget(run), given, used, seeds, *counts, title))
     header = ("solver", "evaluations allowed", "given settings", "all settings", "seeds", "runs", "problems", "what")
     return make_text_table(header, rows, prose=True)
-
-
-def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
-    """Return the best of the records next to the shipped best known value, a row for each problem that has one."""
-    rows = []
-    for group in group_by(records, lambda record: hash_json(make_key(record.inputs.problem))).values():
-        reference, objective = find_reference(group[0].inputs.problem), group[0].inputs.objective
-        best = find_best_known(group)
-        if reference.objective is not None:
-            gap = format_percent(compute_gap(best, reference.objective, objective))
-            values = (with_unit(value, objective.unit) for value in (best, reference.objective))
-            rows.append((group[0].problem, *values, gap, reference.source))
-    if not rows:
-        return "No best known value is shipped for the settings of these runs; gaps are relative to the best of them."
-    header = ("problem", "best of these runs", "best known", "gap", "source of the best known value")
-    return make_text_table(header, rows, "Best known values", prose=True)
 
 
 def describe_budget(record: RunRecord) -> str:

@@ -7,8 +7,7 @@ from functools import partial
 from compare.analysis.columns import EFFORT, EVALUATIONS_TO, JUDGEMENT, MAIN, SECONDS_TO, Column, format_rows
 from compare.analysis.comparison import Comparison
 from compare.analysis.headline import describe_unknown, write_headline
-from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers, rank_over_problems
-from compare.analysis.record_statistics import list_weights
+from compare.analysis.overview import describe_tests, explain_marks, rank_over_problems, tabulate_problems
 from compare.analysis.units import BY_UNIT, name_in_words, name_solver, with_unit
 from compare.drawing.charts import Chart, draw_chart
 from compare.drawing.comparison_figures import make_convergence_charts, make_ecdf_charts, make_final_gap_charts
@@ -169,10 +168,10 @@ def _list_failures(comparison: Comparison) -> tuple[Section, ...]:
     rows = [
         (name_solver(r.solver), str(r.run), str(r.seed), r.status, "; ".join(r.violated[:5]) or "-")
         for r in comparison.records
-        if not r.feasible
+        if not r.feasible or r.feasible_between_samples is False
     ]
-    header = ("solver", "run", "seed", "status", "violated, worst first")
-    return make_table_section("Runs that ended infeasible or failed", header, rows, prose=True)
+    header = ("solver", "run", "seed", "status", "violated, worst first, at the samples or between them")
+    return make_table_section("Runs that failed or violate a limit", header, rows, prose=True)
 
 
 def list_tests(comparison: Comparison) -> tuple[Part, ...]:
@@ -208,7 +207,6 @@ def list_optimum(comparison: Comparison, gaits: Mapping[str, GaitCurves] | str) 
             if charts
             else ()
         ),
-        *_list_violated_between(comparison),
     )
 
 
@@ -245,22 +243,8 @@ def _describe_step(active: ActiveConstraint, unit: str) -> str:
     return f"{active.price * step.size:+z.4f}{'' if unit == '1' else f' {unit}'} for {step.words}"
 
 
-def _list_violated_between(comparison: Comparison) -> tuple[Section, ...]:
-    rows = [
-        (name_solver(r.solver), str(r.run), "; ".join(r.violated[:3]) or "-")
-        for r in comparison.records
-        if r.feasible and r.feasible_between_samples is False
-    ]
-    header = ("solver", "run", "violated on a dense grid, worst first")
-    return make_table_section("Feasible at the samples, not at all times", header, rows, prose=True)
-
-
 def make_settings_section(comparisons: Sequence[Comparison], file: StudyFile) -> Section:
     """Return what the solvers report, how costs are counted, all settings, versions, citations and terms."""
-    sizes = [max((len(r.x) for r in c.records), default=0) for c in comparisons]
-    weights = [
-        (c.problem, *map("{:g}".format, list_weights(n).values())) for c, n in zip(comparisons, sizes, strict=True)
-    ]
     problems = {c.problem: c.records[0].inputs.problem for c in comparisons}
     options = [
         (name, format_settings(problem["parameters"]) or "none", format_settings(problem["options"]))
@@ -276,13 +260,9 @@ def make_settings_section(comparisons: Sequence[Comparison], file: StudyFile) ->
         "the sources; none was tuned on these problems.",
         make_solver_table(record for comparison in comparisons for record in comparison.records),
         make_text_table(("problem", "changed values", "options"), options, prose=True),
-        make_text_table(
-            ("problem", "f", "g", "gradient", "Jacobian", "Hessian"),
-            weights,
-            "Weight of a call in equivalent evaluations. Objective and constraints count separately where they are called "
-            "separately, so gradient methods are never favoured; a gradient run reaches its targets at its end. A polished run "
-            "includes the cost of its search. Times are wall times of the solve, without building or compiling",
-        ),
+        "Objective and constraints count separately where they are called separately, so gradient methods are never favoured; a "
+        "gradient run reaches its targets at its end. A polished run includes the cost of its search. Times are wall times of "
+        "the solve, without building or compiling.",
         make_version_table(file.command, file.date, (r.versions for c in comparisons for r in c.records)),
         make_citation_section(problems.values()),
         TERMS,
@@ -291,42 +271,6 @@ def make_settings_section(comparisons: Sequence[Comparison], file: StudyFile) ->
 
 def make_overview(comparisons: Sequence[Comparison]) -> Section:
     """Return the section on all problems of a study together."""
-    ranking = rank_over_problems(comparisons)
-    parts: list[Part] = [
-        "To see whether one solver is better in general: median gaps to the best known value over all runs. A star marks the "
-        "best median and those that do not differ from it significantly (rank-sum test at 5 %, Holm-corrected over all pairs on "
-        f"the problem). Ranks are those of the medians, of solvers that ran on all problems. {describe_tests(ranking)}".strip(),
-        _make_matrix(comparisons, ranking),
-        *(make_wins_table(comparisons, solver) for solver in list_user_solvers(comparisons)),
-    ]
-    return Section(title="All problems", parts=parts)
-
-
-def _make_matrix(comparisons: Sequence[Comparison], ranking: Ranking) -> Table:
-    ranks = ranking.mean_ranks
-    names = list(dict.fromkeys([*ranks, *(solver.name for c in comparisons for solver in c.solvers)]))
-    rows = []
-    for comparison in comparisons:
-        medians = {solver.name: solver.median_cost for solver in comparison.solvers}
-        rows.append((comparison.problem, *(_format_cell(comparison, name, medians) for name in names)))
-    rows.append(("mean rank", *(f"{ranks[name]:.2f}" if name in ranks else "-" for name in names)))
-    caption = "Median gap of each solver on each problem"
-    return make_text_table(("problem", *map(name_solver, names)), rows, caption)
-
-
-def _format_cell(comparison: Comparison, name: str, medians: Mapping[str, float]) -> str:
-    if name not in medians:
-        return "-"
-    gap = comparison.gap(medians[name])
-    star = " *" if name in comparison.leaders else ""
-    return f"{comparison.format_gap(gap)}{star}" if math.isfinite(gap) else "infeasible"
-
-
-def make_wins_table(comparisons: Sequence[Comparison], solver: str) -> Table:
-    """Return on how many problems a solver is better or worse than each other one."""
-    rows = [(name_solver(r.other), str(r.wins), str(r.ties), str(r.losses)) for r in count_wins(comparisons, solver)]
-    caption = (
-        f"Problems on which {name_solver(solver)} is significantly better, not different, or worse (rank-sum test of the final "
-        "objectives at 5 %, Holm-corrected over all pairs on the problem)"
-    )
-    return make_text_table(("against", "wins", "ties", "losses"), rows, caption)
+    subject, (header, *rows) = tabulate_problems(comparisons)
+    words = f"{explain_marks(subject)} {describe_tests(rank_over_problems(comparisons))}".strip()
+    return Section(title="All problems", parts=[words, make_text_table(header, rows)])

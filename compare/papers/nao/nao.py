@@ -179,7 +179,7 @@ def compare_searches(result: NaoResults, phase: str) -> Found:
     """Return the lead of PSO's median [mW], and the p-values of the paper's test, repeated with other runs."""
     pso, ga = (result.final_powers(phase, search) for search in SEARCHES)
     firsts = range(0, len(pso) - TEST_RUNS + 1, TEST_RUNS) or range(1)
-    tests = [approximate_rank_sum(pso[k : k + TEST_RUNS], ga[k : k + TEST_RUNS]).p_two_sided for k in firsts]
+    tests = [approximate_rank_sum(pso[k : k + TEST_RUNS], ga[k : k + TEST_RUNS]) for k in firsts]
     return Found(1000 * float(np.median(ga) - np.median(pso)), p=tests)
 
 

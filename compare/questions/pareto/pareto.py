@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import make_axis_label
-from compare.drawing.figures import COLOURS, add_legend_below, make_figure, use_style
+from compare.drawing.figures import COLOURS, make_figure, use_style
 from compare.questions.pareto.competing import CompetingObjective, make_competing_objective
 from compare.questions.pareto.front import FrontPoint, Knee, find_knees, solve_front
 from compare.questions.question import Answer, Question, Work, make_record_table, make_table
@@ -313,7 +313,7 @@ def plot_front(findings: FoundFront, criterion: CompetingObjective) -> Drawing:
         end = findings.knees[0].value + 0.08 * np.ptp(values)
     top = np.interp(end, values, powers)
     with use_style():
-        figure = make_figure(7.2, 3.3)
+        figure = make_figure(7.2, 3.7)
         left, right = figure.subplots(1, 2)
         for axes in (left, right):
             _plot_searches(axes, findings.searches)
@@ -326,7 +326,7 @@ def plot_front(findings: FoundFront, criterion: CompetingObjective) -> Drawing:
         left.set(ylabel="power [W]", ylim=(0.0, powers[-1] * 1.06))
         right.set(xlim=(values[0], end), ylim=(powers[0] - 0.08 * (top - powers[0]), top))
         right.set_title("the front's cheap part", loc="left")
-        add_legend_below(figure)
+        figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 

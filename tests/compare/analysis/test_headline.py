@@ -145,7 +145,7 @@ MANY_RUNS = {"pso": [10.1] * 9, "ga": [10.3] * 9, "aco": [10.0] * 9, "ipopt": [1
         (
             make_runs(pso=[10.5]),
             None,
-            "The only PSO run ends at 10.500000 W; no best known value is shipped to compare it with.",
+            "The only PSO run ends at 10.500000 W; no best known value is shipped.",
         ),
         (
             make_runs(pso=[9.0, 10.0]),
@@ -158,7 +158,7 @@ MANY_RUNS = {"pso": [10.1] * 9, "ga": [10.3] * 9, "aco": [10.0] * 9, "ipopt": [1
             ZERO,
             "The median PSO run ends 0.5 W above the proven optimum of 0.000000 W; GA reaches it in both runs.",
         ),
-        (make_runs(pso=[None]), PROVEN, "The only run of PSO is not feasible. The proven optimum is 10.000000 W."),
+        (make_runs(pso=[None]), PROVEN, "The only run, of PSO, is infeasible."),
         (make_runs(pso=[None] * 2, ga=[None] * 2), None, "None of the 4 runs of GA and PSO is feasible."),
         (
             [replace(r, x={}) for r in make_runs(pso=[None] * 2)],

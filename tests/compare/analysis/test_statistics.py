@@ -123,28 +123,15 @@ def test_rank_sum_of_values_that_are_equal_but_for_one() -> None:
 
 
 @pytest.mark.parametrize(
-    ("first", "rank_sum", "z", "p_two_sided", "p_less"),
-    [
-        ([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 15], 70, -3.6772, 2.3577e-4, 1.1789e-4),
-        ([1, 2, 3, 4, 5, 6, 7, 10, 12, 18, 22], 90, -2.3639, 0.018082, 0.0090409),
-    ],
+    ("first", "p"),
+    [([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 15], 2.3577e-4), ([1, 2, 3, 4, 5, 6, 7, 10, 12, 18, 22], 0.018082)],
 )
-def test_rank_sums_that_the_nao_paper_prints(
-    first: list[int], rank_sum: float, z: float, p_two_sided: float, p_less: float
-) -> None:
+def test_rank_sums_that_the_nao_paper_prints(first: list[int], p: float) -> None:
     """Eleven of the ranks 1 to 22 against the others, with continuity correction (Gupta et al. 2023, section 5.3)."""
     others = [rank for rank in range(1, 23) if rank not in first]
-    test = approximate_rank_sum(first, others)
-    assert test.rank_sum == rank_sum
-    assert test.z == pytest.approx(z, abs=5e-5)  # the paper's four decimals
-    assert (test.p_two_sided, test.p_less) == pytest.approx((p_two_sided, p_less), rel=1e-4)
-    assert compute_rank_sum(first, others) == pytest.approx(p_two_sided, rel=2e-3)
-
-
-def test_equal_and_infinite_values_by_the_normal_approximation() -> None:
-    equal = approximate_rank_sum([1.0, 1.0], [1.0])
-    assert (equal.z, equal.p_two_sided, equal.p_less) == (0.0, 1.0, 0.5)
-    assert approximate_rank_sum([1.0, 2.0], [3.0, math.inf]).rank_sum == 3.0
+    assert approximate_rank_sum(first, others) == pytest.approx(p, rel=1e-4)
+    assert compute_rank_sum(first, others) == pytest.approx(p, rel=2e-3)
+    assert approximate_rank_sum([1.0, 1.0], [1.0]) == 1.0
 
 
 @pytest.mark.parametrize(

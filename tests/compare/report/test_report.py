@@ -124,10 +124,6 @@ def test_pairs(tables: Tables) -> None:
     assert rows["swarm < colony"][-1] == f"{(3 + 3 + 2 + 2) / 16:.3f}"
 
 
-def test_weights_of_calls(tables: Tables) -> None:
-    assert tables.row("walk", "1") == ["walk", "1", "1", "3", "3", "6"]
-
-
 def test_prices_are_those_of_the_best_optimum(tables: Tables) -> None:
     assert tables.row("knee <b>torque</b>")[1:] == ["upper", "2.5 Nm", "-0.125 W per Nm", "-0.0125 W for 0.1 Nm"]
 
