@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from casadi import MX
+from casadi import MX, sqrt
 
 from nlp_gait import compile_objective, solve
 from nlp_gait.backends.exact import ExactValues, build_exact_model
@@ -90,3 +90,13 @@ def test_an_objective_in_units_that_are_too_large_is_refused_everywhere() -> Non
             use(scaled(1e-12))
     assert solve(scaled(1e-3)).objective == pytest.approx(1.5e-3, rel=1e-6)
     assert solve(scaled(0.0)).converged  # a constant: any feasible point is an optimum
+
+
+def test_a_bound_that_is_nan_is_not_satisfied() -> None:
+    """The limit's square root has no value below zero; CasADi's fmax would ignore it."""
+    problem = toy(lambda x, y, limit, ops: (x, (row(x + y, lower=sqrt(limit)),)), limit=0.25)
+    model = build_exact_model(problem)
+    assert model.at([1.0, 1.0], problem.p).feasible
+    values = model.at([1.0, 1.0], problem.with_values(limit=-1.0).p)
+    assert np.isnan(values.lower[0]) and np.isnan(values.violation) and not values.feasible
+    assert [violated.name for violated in model.find_violated(values)] == ["row"]

@@ -1,11 +1,18 @@
 """Paths of neighbouring problems."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from casadi import MX
 
 from nlp_gait.backends.solve import Continuation, solve_both_ways
-from nlp_gait.formulation import Constraint, GaitProblem
+from nlp_gait.backends.solvers.solver import Solver, judge_point
+from nlp_gait.formulation import Array, Constraint, GaitProblem
+from nlp_gait.formulation.solution import Evaluations, Outcome
+from nlp_gait.interrupts import never
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, toy
 
@@ -57,3 +64,26 @@ def test_a_warm_start_needs_fewer_iterations_than_a_cold_one() -> None:
     warm = Continuation(starts=1)
     first, *others = [warm.solve(problem).best.iterations for problem in problems]
     assert max(others) < first
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorder(Solver):
+    """A solver that ends where it starts, and says where that was."""
+
+    name: ClassVar[str] = "recorder"
+
+    starts: list[list[float]] = field(default_factory=list)
+
+    def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
+        self.starts.append(x0.tolist())
+        return judge_point(
+            self.name, problem, x0, x0, claimed=True, status="", iterations=0, evaluations=Evaluations(), time_s=0.0
+        )
+
+
+def test_a_cold_start_from_the_neighbour_is_within_the_bounds() -> None:
+    problem, recorder = toy(lambda x, y, limit, ops: (x**2 + y**2, (row(x, upper=MX(9.0)),))), Recorder()
+    path = Continuation(starts=1, seed=3, solver=recorder)
+    path.run(problem.fix(x=2.0, y=3.0))
+    path.run(problem.with_values(**{"x.upper": 0.5, "y.lower": 1.0}))
+    assert recorder.starts == [[2.0, 3.0], [0.5, 3.0]]

@@ -1,5 +1,6 @@
 """Derivatives of optima: by hand, by solving again, and by CasADi's own."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import differentiate_by_models, differentiate_by_parameters
 from nlp_gait.backends.solve import Continuation, find_cheapest_feasible
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.formulation import Constraint, GaitProblem
+from nlp_gait.formulation import Constraint, GaitProblem, Variable
 from nlp_gait.formulation.solution import Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, toy
@@ -151,3 +152,27 @@ def test_a_solution_lists_its_derivatives_with_units(tmp_path: Path) -> None:
     header, first, *others = (tmp_path / "table.csv").read_text().splitlines()
     assert header == "parameter,parameter_unit,reach_down,reach_up,cost [J],x [m],y [m]" and len(others) == 4
     assert first.startswith("limit,m,") and float(first.split(",")[4]) == table.value("cost", "limit")
+
+
+def test_a_price_reaches_zero_where_its_limit_ends_to_bind() -> None:
+    """(x - 1)^2 + (y - 2)^2 with x <= limit = 0.5: the slope is 2 (limit - 1), up to limit 1; down to x = -2."""
+    problem = toy(lambda x, y, limit, ops: ((x - 1) ** 2 + (y - 2) ** 2, (row(x, upper=limit),)), limit=0.5)
+    answer = differentiate_by_parameters(found(problem))
+    assert answer.objective[0] == pytest.approx(-1.0)
+    assert answer.x[:, 0] == pytest.approx([1.0, 0.0], abs=1e-9)
+    assert answer.reach[:, 0] == pytest.approx([-2.5, 0.5])
+
+
+def test_derivatives_by_the_model_are_right_where_its_variables_are_scaled_otherwise() -> None:
+    """a (x - 1)^2 + (y - a x)^2 with x <= 0.5: at x = 1/2, y = a/2, the optimum is a/4 and dy/da = 1/2."""
+
+    def model(a: float) -> GaitProblem:
+        problem = toy(lambda x, y, limit, ops: (a * (x - 1) ** 2 + (y - a * x) ** 2, (row(x, upper=limit),)), limit=0.5)
+        ranges = {"x": (-a, 2.0 * a), "y": (-1.0, 1.0 + 4.0 * a)}  # of a robot's size
+        variables = tuple(Variable(name=name, unit="m", lower=low, upper=high) for name, (low, high) in ranges.items())
+        return replace(problem, variables=variables)
+
+    middle, half = 1.3, 1e-4
+    answer = differentiate_by_models(found(model(middle)), [(model(middle + half), model(middle - half), 2 * half)])
+    assert answer.objective[0] == pytest.approx(0.25, rel=1e-6)
+    assert answer.x[:, 0] == pytest.approx([0.0, 0.5], abs=1e-6)

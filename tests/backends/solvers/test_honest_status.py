@@ -9,8 +9,9 @@ import pytest
 from casadi import MX
 
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solve import make_solution, solve
 from nlp_gait.backends.solvers.ipopt import CONVERGED, STATUS_WORDS, IpoptSettings, find_linear_solver
+from nlp_gait.backends.solvers.solver import judge_point
 from nlp_gait.formulation import Constraint
 from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -145,3 +146,20 @@ def test_options_that_lie_in_the_working_folder_change_nothing(
     assert solution.best.linear_solver == expected.best.linear_solver
     assert [path.name for path in tmp_path.iterdir()] == ["ipopt.opt"]
     assert "".join(capfd.readouterr()) == ""
+
+
+def test_the_solution_is_the_cheapest_start_that_converged() -> None:
+    """By hand: converged at 3 and 2, feasible but not converged at 1, cheaper than all but infeasible at 0.5."""
+    problem = toy(lambda x, y, limit, ops: (x + y, (row(x + y, lower=limit),)), limit=0.8)
+    points = {(1.0, 2.0): True, (1.0, 1.0): True, (0.5, 0.5): False, (0.25, 0.25): True}
+    starts = [
+        judge_point(
+            "hand", problem, np.zeros(2), np.array(x), claimed=claimed, status=f"at {x}", iterations=0,
+            evaluations=Evaluations(), time_s=0.0,
+        )
+        for x, claimed in points.items()
+    ]  # fmt: skip
+    solution = make_solution(problem, starts)
+    assert (solution.objective, solution.converged, solution.status) == (2.0, True, "at (1.0, 1.0)")
+    assert make_solution(problem, starts[2:]).objective == 1.0  # feasible before infeasible
+    assert "no start converged to a feasible point" in make_solution(problem, starts[3:]).status

@@ -6,7 +6,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from casadi import MX
+from casadi import MX, vertcat
 
 from nlp_gait.backends.solvers import working_set
 from nlp_gait.backends.solvers.ipopt import QUIET, IpoptSettings
@@ -99,3 +99,18 @@ def test_a_gait_has_few_rows_that_matter(compiled: bool) -> None:
     other = load("nao-dsp", intervals=np.int64(5))  # not the same object
     settings.prepare(other).run(other.with_values(torque_change_limit_Nm=5.0), x0)
     assert settings.prepare(other).run(other, x0).x.tolist() == found.x.tolist()
+
+
+def test_a_row_that_is_violated_a_little_joins() -> None:
+    """The greatest x below two limits that differ by 5e-4, of which the run begins with the higher one."""
+    x, p = MX.sym("x"), MX.sym("p")
+    nlp = {"x": x, "p": p, "f": -p * x, "g": vertcat(x, x)}
+    watch = IterationWatch(nlp)
+    whole = ca.nlpsol("whole", "ipopt", nlp, {**QUIET, "iteration_callback": watch})
+    functions = {name: whole.get_function(name) for name in NAMES}
+    few = WorkingSet(nlp, functions, QUIET, watch, np.array([True, False]))
+    watch.begin(never, math.inf)
+    limits = {"lbx": [-9.0], "ubx": [9.0], "lbg": np.full(2, -np.inf), "ubg": np.array([1.0, 0.9995])}
+    found = few(p=1.0, x0=0.0, **limits)
+    assert few.stats()["success"] and float(found["x"]) == pytest.approx(0.9995, abs=1e-7)
+    assert found["lam_g"] == pytest.approx([0.0, 1.0], abs=1e-5)
