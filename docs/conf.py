@@ -6,6 +6,7 @@ names to ``docs/generated``, and the gallery runs the examples.
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 import nlp_gait  # noqa: E402
-from docs.pages import algorithms, api, commands, front, gallery, gradient, model, numbers, papers, playground, problems  # noqa: E402
+from docs.pages import algorithms, api, commands, gallery, gradient, model, numbers, papers, playground, problems  # noqa: E402
 from docs.pages.api import linked  # noqa: E402
 
 project = "nlp-gait"
@@ -70,14 +71,31 @@ html_theme_options = {
 sphinx_gallery_conf = gallery.configuration(ROOT)
 
 
+slow_pages = []  # the process that writes them
+
+
 def setup(app):
     """Write the generated pages before any page is read."""
+    app.connect("builder-inited", start_slow_pages, priority=0)  # before the gallery runs the examples
     app.connect("builder-inited", write_pages)
     app.connect("autodoc-process-docstring", linked)
+    app.connect("env-updated", wait_for_slow_pages)
+
+
+def start_slow_pages(app):
+    """Write pages that Sphinx does not read, in a process of their own: a study, films of gaits, the playground."""
+    folder = Path(app.srcdir) / "generated"
+    slow_pages.append(subprocess.Popen([sys.executable, "-m", "docs.pages.front", str(folder)], cwd=ROOT))
 
 
 def write_pages(app):
-    """Pages of problems, papers, algorithms, commands and names, and the playground."""
+    """Pages of problems, papers, algorithms, commands and names."""
     folder = Path(app.srcdir) / "generated"
-    for part in (numbers, problems, papers, algorithms, commands, api, model, gradient, playground, front):
+    for part in (numbers, problems, papers, algorithms, commands, api, model, gradient, playground):
         part.write(folder)
+
+
+def wait_for_slow_pages(app, env):
+    """Wait until all files exist that Sphinx copies."""
+    if slow_pages.pop().wait():
+        raise RuntimeError("docs.pages.front failed; it has printed why")

@@ -1,4 +1,7 @@
-"""What visitors open first: a real report to explore, and a page in 3-D of the best known gait of each problem."""
+"""What visitors open first: a real report to explore, a page in 3-D of the best known gait of each problem, the playground.
+
+``python -m docs.pages.front docs/generated`` writes them, beside Sphinx.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from pathlib import Path
 
 from compare.report.interactive import animate_gait
 from docs.difficulty import difficulties
-from docs.pages.playground import FOLDER
+from docs.pages.playground import FOLDER, write_playground
 from docs.pages.problems import GAITS, names
 from nlp_gait.formulation import load
 
@@ -29,3 +32,8 @@ def write(folder: Path) -> None:
         problem, found = load(name), measured.get(name)
         if found is not None and found.best is not None and problem.display.skeleton is not None:
             animate_gait(problem, found.best.x, "best known").write(site / GAITS / f"{name}.html")
+
+
+if __name__ == "__main__":
+    write_playground(Path(sys.argv[1]))
+    write(Path(sys.argv[1]))

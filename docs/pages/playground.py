@@ -67,7 +67,12 @@ FAMILIES = {
 
 
 def write(folder: Path) -> None:
-    """Write the playground, where it can be compiled, and the page that leads to it."""
+    """Write the page that leads to the playground."""
+    write_all(folder / "playground", {"index.md": introduce(load(ID), left_out=not has_compiler())})
+
+
+def write_playground(folder: Path) -> None:
+    """Write the playground where it can be compiled."""
     path = folder / FOLDER / PAGE
     path.parent.mkdir(parents=True, exist_ok=True)
     if has_compiler():
@@ -75,7 +80,6 @@ def write(folder: Path) -> None:
     else:
         path.unlink(missing_ok=True)
         print(f"the playground is left out: {REMEDY}", flush=True)
-    write_all(folder / "playground", {"index.md": introduce(load(ID), left_out=not has_compiler())})
 
 
 def introduce(instance: Instance, *, left_out: bool) -> str:

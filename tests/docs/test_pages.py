@@ -137,6 +137,7 @@ def test_without_a_compiler_the_page_is_left_out(
     old = tmp_path / playground.FOLDER / playground.PAGE
     old.parent.mkdir()
     old.touch()
+    playground.write_playground(tmp_path)
     playground.write(tmp_path)
     assert not old.exists()
     sentence = "WebAssembly needs the package ziglang: pip install ziglang"

@@ -39,6 +39,7 @@ def browser() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Path:
     folder = tmp_path_factory.mktemp("generated")
+    playground.write_playground(folder)
     playground.write(folder)
     assert "Open the playground" in (folder / "playground" / "index.md").read_text(encoding="utf-8")
     return folder / playground.FOLDER / playground.PAGE

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.slow  # each gait is simulated
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import measure  # noqa: E402
 from nlp_gait.simulation.plan import make_plan  # noqa: E402
-from nlp_gait.simulation.simulate import Conditions, Push, Run, simulate_plan  # noqa: E402
+from nlp_gait.simulation.simulate import Conditions, Push, SimulationRun, simulate_plan  # noqa: E402
 
 ONE_NEWTON_S = 1.0
 
@@ -72,7 +72,7 @@ def test_a_push_moves_and_a_strong_one_fells(simulated):
 
 def test_a_short_push_changes_the_momentum_by_its_impulse(gait):
     """In a millisecond the ground's friction cannot give a tenth of it."""
-    run = Run(make_plan(gait("dsp optimum")), Conditions(friction=0.3))
+    run = SimulationRun(make_plan(gait("dsp optimum")), Conditions(friction=0.3))
     run.advance(0.5)
     assert run.data.ncon > 0 and set(run.data.contact.friction[:, 0].tolist()) == {0.3}
     momenta = []

@@ -35,12 +35,12 @@ SAMPLES = Samples(
     grid=Grid(intervals=COUNT - 1),
     duration=MX(1.0),
     progress=MX(DM(np.linspace(0.0, 1.0, COUNT)).T),
-    values={
-        "torque": MX(DM(TORQUE)),
-        "power": MX(DM(POWER)),
-        "q": MX(DM(Q)),
-        "qd": MX(DM(QD)),
-    },
+    evaluate={
+        Samples.torque: MX(DM(TORQUE)),
+        Samples.power: MX(DM(POWER)),
+        Samples.q: MX(DM(Q)),
+        Samples.qd: MX(DM(QD)),
+    }.__getitem__,
 )
 
 
