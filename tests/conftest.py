@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -15,6 +16,7 @@ from nlp_gait.backends.kernel.compiled import available_cores
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.
 settings.register_profile("reproducible", derandomize=True, deadline=None)
+settings.register_profile("nightly", deadline=None, print_blob=True)
 settings.load_profile("reproducible")
 
 # Else each worker and each process that a test starts compiles every module again, and pytest rewrites every test again.
@@ -30,8 +32,55 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # Programs that pip does not install, and that tests marked `program` need.
 PROGRAMS = ("Rscript", "julia", "mkoctfile", "octave-cli", "pdflatex")
 
-# Folders of tests that start whole commands, studies and papers; other slow tests are marked where they stand.
-SLOW_FOLDERS = tuple(f"tests/compare/{name}/" for name in ("cli", "papers", "questions"))
+# Processor time of tests that take longer than SLOW_S, a line for each function: that of its longest case [s].
+TIMES = Path(__file__).with_name("times.txt")
+SLOW_S, NIGHTLY_S = 0.25, 3.0
+BEGUN = pytest.StashKey[float]()
+measured: dict[str, float] = {}
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that rewrites ``times.txt``."""
+    parser.addoption(
+        "--record-times", action="store_true", help=f"write the processor time of slow tests to {TIMES.name}"
+    )
+
+
+def read_times() -> dict[str, float]:
+    """Return the recorded times of slow tests by name [s]."""
+    lines = (line.split(maxsplit=1) for line in TIMES.read_text(encoding="utf-8").splitlines())
+    return {name: float(seconds) for seconds, name in lines}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Note the processor time of this process and of those that it waited for."""
+    item.stash[BEGUN] = sum(os.times()[:4])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[None]:
+    """Add the processor time of a test to its last report."""
+    report = yield
+    if call.when == "teardown":
+        report.user_properties.append(("processor_s", sum(os.times()[:4]) - item.stash.get(BEGUN, sum(os.times()[:4]))))
+    return report
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Keep the processor time of the longest case of each test."""
+    if report.when == "teardown":
+        name = report.nodeid.partition("[")[0]
+        measured[name] = max(measured.get(name, 0.0), dict(report.user_properties)["processor_s"])
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Rewrite the times of all tests of the files that have run."""
+    if session.config.getoption("--record-times") and not hasattr(session.config, "workerinput"):
+        files = {name.partition("::")[0] for name in measured}
+        kept = {name: seconds for name, seconds in read_times().items() if name.partition("::")[0] not in files}
+        slow = {name: seconds for name, seconds in (kept | measured).items() if seconds >= SLOW_S}
+        TIMES.write_text("".join(f"{slow[name]:.2f} {name}\n" for name in sorted(slow)), encoding="utf-8")
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -41,10 +90,13 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what lies in these folders, and leave out what needs a program that is not installed."""
-    without = []
+    """Mark what takes long, and leave out what needs a program that is not installed."""
+    without, times = [], read_times()
     for item in items:
-        if item.nodeid.startswith(SLOW_FOLDERS):
+        seconds = times.get(item.nodeid.partition("[")[0], 0.0)
+        if seconds >= NIGHTLY_S and not item.get_closest_marker("commit"):
+            item.add_marker(pytest.mark.nightly)
+        if seconds >= SLOW_S or item.get_closest_marker("nightly"):
             item.add_marker(pytest.mark.slow)
         needed = {name for mark in item.iter_markers("program") for name in mark.args}
         assert needed <= set(PROGRAMS), item.nodeid
