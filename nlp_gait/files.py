@@ -15,7 +15,6 @@ import os
 import re
 import secrets
 import stat
-import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -24,27 +23,21 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-from nlp_gait.errors import GaitError, InputError, OutputError
+from nlp_gait.errors import GaitError, InputError, OutputError, warn_once
 
 LARGEST_FILE = 64 * 2**20  # bytes; a record has about 10 kB, a result with thousands of variables some MB
 DEEPEST = 32  # levels of objects and lists; files of this package have six
 LARGEST_INTEGER = 2**63 - 1
 SHOWN = 60  # characters of a value in a message
-EXAMINED = 4096  # bytes at each end of a file that is to be replaced
 # Writing takes far less, so an older temporary file belongs to no running process.
 LEFTOVER_AGE_S = 60.0
 LOCK = ".lock"  # stays in its folder: removed, it could be locked twice
 LOCK_CHECKED_EVERY_S = 0.01
+WAIT_SILENTLY_S = 5.0
 TEMPORARY = re.compile(r"\.[0-9a-f]{16}\.tmp")
 FORMULA = tuple("=+-@")  # a spreadsheet computes a cell that begins with one of these
 # Errors of systems on which a folder cannot be opened or flushed.
 NOT_FOR_FOLDERS = (errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM, errno.EBADF, errno.EISDIR)
-
-
-def rename(path: Path, target: Path) -> None:
-    """Rename a file within its folder, durably, replacing an existing file; raises OSError."""
-    path.replace(target)
-    flush(target.parent)
 
 
 def flush(path: Path) -> None:
@@ -53,12 +46,7 @@ def flush(path: Path) -> None:
     try:
         descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)
         try:
-            if sys.platform == "darwin":  # where fsync does not flush the disk's cache
-                import fcntl
-
-                fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)
-            else:
-                os.fsync(descriptor)
+            os.fsync(descriptor)
         finally:
             os.close(descriptor)
     except OSError as error:
@@ -69,23 +57,26 @@ def flush(path: Path) -> None:
 @contextmanager
 def lock_folder(path: Path, name: str = LOCK) -> Iterator[None]:
     """Let one process at a time into such a block for a folder, by a file in it; no lock where that cannot be written."""
-    from filelock import FileLock  # on first use: most commands lock nothing
+    from filelock import FileLock, Timeout  # on first use: most commands lock nothing
 
     lock = FileLock(path / name)
     with suppress(OSError):  # a folder that may only be read, a full disk
-        lock.acquire(poll_interval=LOCK_CHECKED_EVERY_S)
+        try:
+            lock.acquire(timeout=WAIT_SILENTLY_S, poll_interval=LOCK_CHECKED_EVERY_S)
+        except Timeout:
+            warn_once(f"waiting for another process that works in {path}; delete {path / name} if there is none")
+            lock.acquire(poll_interval=LOCK_CHECKED_EVERY_S)
     try:
         yield
     finally:
         lock.release()
 
 
-def make_folder(path: Path, mode: int = 0o777) -> None:
-    """Make a folder and its parents, all with a mode, durably; existing ones are left alone; raises OSError."""
+def make_folder(path: Path) -> None:
+    """Make a folder and its parents, durably; existing ones are left alone; raises OSError."""
     for folder in reversed([path, *(parent for parent in path.parents if not parent.exists())]):
-        is_new = not folder.exists()
-        folder.mkdir(mode=mode, exist_ok=True)
-        if is_new:
+        if not folder.exists():
+            folder.mkdir(exist_ok=True)
             flush(folder.parent)
 
 
@@ -186,50 +177,16 @@ def write_json(path: Path, data: Any) -> None:
     write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 
-_inputs: set[Path] | None = None  # of this command; None: none is protected
-_forced = False
-
-
-def protect_inputs(paths: Iterable[Path], force: bool = False) -> None:
-    """Let no function write to the inputs of a command, these and later ones, unless ``force``; release those of earlier ones."""
-    global _inputs, _forced
-    _inputs, _forced = None if force else set(), force
-    for path in paths:
-        protect_input(path)
-
-
-def protect_input(path: Path) -> None:
-    """Protect one more file that this command reads."""
-    if _inputs is not None:
-        _inputs.update((_find_place(path), path.resolve()))
-
-
-def check_output(path: Path, written_content: bytes | None) -> None:
-    """Check, before the work, that a file can be written and, if it exists, replaced; raises OutputError.
-
-    Unless this command may replace any file, it must contain what this package writes: a pattern for its first or last bytes.
-    """
+def check_output(path: Path, force: bool = False) -> Path:
+    """Return the path of a file after checking, before the work, that it can be written, and replaced only by ``force``."""
     check_path(str(path), f"cannot write to {str(path)!r}", OutputError)
-    _check_no_input(path)
     make_writable_folder(path.parent)
     with convert_errors(f"cannot write {str(path)!r}", OutputError):
         if path.is_dir():
             raise ValueError("it is a folder; name a file")
-        if path.is_file() and not _forced:
-            content = path.read_bytes()
-            ends = content[:EXAMINED] + content[-EXAMINED:]
-            if written_content is None or not re.search(written_content, ends, re.DOTALL):
-                raise ValueError("it exists, and nlp-gait did not write it; name another file, or give --force")
-
-
-def _check_no_input(path: Path) -> None:
-    if _inputs and _find_place(path) in _inputs:
-        raise OutputError(f"cannot write {str(path)!r}: this command reads it; name another file, or give --force")
-
-
-def _find_place(path: Path) -> Path:
-    """Return the absolute place of a name, which may be a link."""
-    return path.parent.resolve() / path.name
+        if os.path.lexists(path) and not force:
+            raise ValueError("it exists; name another file, or give --force")
+    return path
 
 
 @contextmanager
@@ -238,7 +195,6 @@ def replace_file(path: Path) -> Iterator[Path]:
 
     A power cut leaves either the complete new file or the old state.
     """
-    _check_no_input(path)
     temporary = None
     try:
         with convert_errors(f"cannot write {str(path)!r}", OutputError):
@@ -249,7 +205,8 @@ def replace_file(path: Path) -> Iterator[Path]:
             temporary = unused
             yield temporary
             flush(temporary)
-            rename(temporary, path)
+            temporary.replace(path)
+            flush(path.parent)
     finally:
         if temporary is not None:
             with suppress(OSError):

@@ -12,8 +12,8 @@ import math
 import os
 import select
 import sys
-from collections.abc import Callable, Container, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,24 +21,13 @@ import typer
 
 from compare.cli.printing import Output, fail, print_output, say_error
 from nlp_gait.errors import GaitError, InputError
-from nlp_gait.files import check_output, protect_inputs
+from nlp_gait.files import check_output
 from nlp_gait.interrupts import raise_interrupts
 from nlp_gait.option_groups import find_groups, list_options, pack_options, replace_signature
 
-# In the annotation of a parameter that names the folder, the file, or either, that the command writes.
-OUTPUT, OUTPUT_FILE, OUTPUT_OF_ANY_KIND = "output", "output file", "output of any kind"
-# What is in the first or last bytes of a file that a command wrote, by suffix.
-WRITTEN_CONTENT = {
-    ".json": rb'\A\{\n "(schema": \d+,\n "(problem|kind|robot)|names": \[|header": \{\n  "frame_id)',
-    ".csv": rb"\At_s,|\A[^\n]*,violation,feasible,feasible_between_samples,guaranteed",
-    ".motion": rb"\A#WEBOTS_MOTION,V1\.0,",
-    ".xml": rb'\A<mujoco model="[^"]*">\n  <compiler angle="radian" autolimits="true" />\n  <option integrator="implicitfast"',
-    ".npz": rb"joints\.npy",
-    ".zip": rb"manifest\.json",
-    ".html": rb'<meta name="generator" content="nlp-gait">',
-    ".gif": rb"\AGIF89a.*nlp-gait",
-    ".png": rb"\A\x89PNG.*Matplotlib",
-}
+# In the annotation of a parameter that names the folder, or the file, that the command writes.
+OUTPUT, OUTPUT_FILE = "output", "output file"
+FORCE = "Replace files that exist."
 SESSION = "session"  # of one that decides how and where a study runs, not what it computes
 CONTINUE = "rerun the command to continue"
 
@@ -50,7 +39,6 @@ def _add_flag(name: str, flag: str, words: str, *marks: str) -> inspect.Paramete
 
 CONTEXT = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
 JSON = _add_flag("as_json", "--json", "Print one JSON object.", SESSION)
-FORCE = _add_flag("force", "--force", "Replace files that exist.")
 # Errors of the system if a file cannot grow.
 NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
@@ -60,9 +48,8 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
     listed = list_options(function).values()
     options = [*(option.replace(kind=inspect.Parameter.KEYWORD_ONLY) for option in listed), JSON]
     files = [option.name for option in options if OUTPUT_FILE in get_marks(option)]
-    outputs = {option.name for option in options if get_marks(option) & {OUTPUT, OUTPUT_FILE, OUTPUT_OF_ANY_KIND}}
-    if any(get_marks(option) & {OUTPUT_FILE, OUTPUT_OF_ANY_KIND} for option in options):
-        options.append(FORCE)
+    if files:
+        options.append(_add_flag("force", "--force", FORCE))
     adds_context = not any(option.annotation is typer.Context for option in options)
     options += [CONTEXT] * adds_context
     groups = find_groups(function)
@@ -75,10 +62,10 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
         try:
             with raise_interrupts():
                 _check_values(context, given)
-                protect_inputs(_find_inputs(given, outputs), given.pop("force", False))
+                force = given.pop("force", False) if files else False
                 for name in files:
                     if given[name] is not None:
-                        check_output_file(given[name])
+                        check_output(given[name], force)
                 output = function(**pack_options(groups, given))
                 print_output(output, as_json)
                 sys.stdout.flush()  # report a failed write here, not at the interpreter's exit
@@ -118,12 +105,6 @@ def _check_values(context: typer.Context, given: Mapping[str, Any]) -> None:
             raise InputError(f"{option} is an empty text; give a value, or leave it out (is a shell variable not set?)")
 
 
-def check_output_file(path: Path) -> Path:
-    """Return a path after ``check_output``: a file that no command wrote is not replaced, unless with --force."""
-    check_output(path, WRITTEN_CONTENT.get(path.suffix.lower()))
-    return path
-
-
 @contextmanager
 def report_interrupts(sentence: str = "interrupted; nothing was written") -> Iterator[None]:
     """Let Ctrl-C inside end the command with this sentence."""
@@ -137,18 +118,6 @@ def describe_stored(folder: Path) -> str:
     """Return how many results are stored in a folder, and how to continue."""
     finished = sum(1 for files in ("store/**/*.json", "records/*/*.json") for _ in folder.glob(files))
     return f"{finished} finished results are stored in {folder}; {CONTINUE}"
-
-
-def _find_inputs(given: Mapping[str, Any], outputs: Container[str]) -> Iterator[Path]:
-    """Yield the existing files that arguments name: alone, as the value of an option, or as the file of user code."""
-    for name, value in given.items():
-        for text in value if isinstance(value, (list, tuple)) else [value]:
-            if name in outputs or not isinstance(text, (str, Path)):
-                continue
-            for candidate in (str(text), str(text).partition("=")[2], str(text).rpartition(":")[0]):
-                with suppress(OSError, ValueError):  # a name that is too long, or none
-                    if candidate and Path(candidate).is_file():
-                        yield Path(candidate)
 
 
 def get_marks(option: inspect.Parameter) -> set[object]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from compare.cli.command import OUTPUT_OF_ANY_KIND, check_output_file, command, report_interrupts
+from compare.cli.command import FORCE, OUTPUT, command, report_interrupts
 from compare.cli.options import Code, Limits, ProblemOptions, Values, name_all
 from compare.cli.printing import Output
 from compare.study.record import load_result_or_record
@@ -15,6 +15,7 @@ from nlp_gait import gaitbench
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.export.formats import FORMATS, PERIOD_MS, write_as
 from nlp_gait.export.solver import export_solver
+from nlp_gait.files import check_output
 from nlp_gait.formulation import Result
 from nlp_gait.gaitbench.c_export import export_objective
 
@@ -31,11 +32,12 @@ def export(
     source: Annotated[str, Argument(metavar="RESULT.json|PROBLEM", help=SOURCE)],
     *,
     to: Annotated[str, Option(metavar="KIND", help=KIND)],
-    out: Annotated[Path | None, Option(help=OUT), OUTPUT_OF_ANY_KIND] = None,
+    out: Annotated[Path | None, Option(help=OUT), OUTPUT] = None,
     period_ms: Annotated[int, Option(min=1, max=86400000, help="Time between rows [ms].")] = PERIOD_MS,
     values: Values = None,
     limits: Limits = None,
     code: Code = None,
+    force: Annotated[bool, Option("--force", help=FORCE)] = False,
 ) -> Output:
     """Write a gait for other tools or as a page in 3-D, or a problem for other solvers.
 
@@ -53,12 +55,12 @@ def export(
     if to in PROBLEMS:
         if out is None:
             raise InputError(f"--to {to} writes several files; name their folder by --out DIR")
-        return Output(data={"source": source, "kind": to}, written=PROBLEMS[to](source, changes, out))
+        return Output(data={"source": source, "kind": to}, written=PROBLEMS[to](source, changes, out, force))
     if changes != ProblemOptions():
         raise InputError(f"--to {to} writes a stored gait with its own options and values; leave out --set and --limit")
     ending, write = GAITS[to]
     result, path = load_result_or_record(Path(source)), Path(source)
-    target = check_output_file(out or path.with_name(path.stem + ending))
+    target = check_output(out or path.with_name(path.stem + ending), force)
     with report_interrupts():
         write(target, result, period_ms)
     return Output(data={"source": source, "kind": to}, written=[target])
@@ -70,14 +72,14 @@ def _write_page(path: Path, result: Result, period_ms: int) -> None:
     animate_gait(result.problem, result.x, result.problem.name).write(path)
 
 
-def _write_objective(source: str, changes: ProblemOptions, folder: Path) -> list[Path]:
+def _write_objective(source: str, changes: ProblemOptions, folder: Path, force: bool) -> list[Path]:
     if changes != ProblemOptions():
         raise InputError("--to objective writes an instance as it is; leave out --set and --limit")
-    return export_objective(gaitbench.load(source), folder)
+    return export_objective(gaitbench.load(source), folder, force)
 
 
-def _write_solver(source: str, changes: ProblemOptions, folder: Path) -> list[Path]:
-    return export_solver(changes.make_spec(source).load(), folder)
+def _write_solver(source: str, changes: ProblemOptions, folder: Path, force: bool) -> list[Path]:
+    return export_solver(changes.make_spec(source).load(), folder, force)
 
 
 # Kinds of files for a gait: usual ending, and the function that writes it, with the time between rows [ms].
@@ -85,7 +87,7 @@ GAITS: Mapping[str, tuple[str, Callable[[Path, Result, int], None]]] = {
     **{name: (ending, partial(write_as, name)) for name, ending in FORMATS.items()},
     "html": (".html", _write_page),
 }
-PROBLEMS: Mapping[str, Callable[[str, ProblemOptions, Path], Sequence[Path]]] = {
+PROBLEMS: Mapping[str, Callable[[str, ProblemOptions, Path, bool], Sequence[Path]]] = {
     "objective": _write_objective,
     "solver": _write_solver,
 }

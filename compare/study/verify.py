@@ -19,7 +19,7 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.formulation.result import StoredProblem
-from nlp_gait.user_code import is_user_code, resolve_code
+from nlp_gait.user_code import is_user_code, resolve_code, shorten_reference
 
 # A total violation of up to 1e-6 may improve the objective by up to this much, relatively.
 SLACK = 1e-4
@@ -125,12 +125,19 @@ def _fold(rows: Sequence[Difference]) -> list[Difference]:
 
 
 def _list_missing(folder: Path, records: Sequence[RunRecord]) -> Iterator[Difference]:
-    """Yield planned runs without a record, and other versions than those of this machine."""
-    there = {(record.problem, record.solver, record.run) for record in records}
+    """Yield planned runs without a record, or with that of another solver or seed, and versions that are not this machine's."""
+    there = {(record.problem, record.solver, record.run): record for record in records}
     settings = read_study_file(folder).read_settings(f"study {str(folder / FILE)!r}")
     for run in () if settings is None else settings.make_runs():
-        if (key := (run.problem.title, run.title, run.number)) not in there:
-            yield Difference("{}, {}, run {}".format(*key), "missing", "it is planned by study.json")
+        record = there.get((run.problem.title, run.title, run.number))
+        if record is None:
+            name = f"{run.problem.title}, {run.title}, run {run.number}"
+            yield Difference(name, "missing", "it is planned by study.json")
+        elif (_shorten(record.inputs.solver), record.seed) != (_shorten(run.solver), run.run_seed):
+            planned = f"{run.solver} with seed {run.run_seed}"
+            yield Difference(
+                record.name, "differs", f"it is of {record.inputs.solver} with seed {record.seed}, planned is {planned}"
+            )
     here = list_versions()
     for name in ("nlp-gait", "casadi"):
         others = {
@@ -140,6 +147,14 @@ def _list_missing(folder: Path, records: Sequence[RunRecord]) -> Iterator[Differ
             yield Difference(
                 name, "not repeated", f"computed by version {', '.join(sorted(others))}; here {here[name]}"
             )
+
+
+def _name_inputs(record: RunRecord) -> str:
+    return f"{record.inputs.solver} with seed {record.seed}"
+
+
+def _shorten(solver: object) -> object:
+    return shorten_reference(solver) if isinstance(solver, str) else solver
 
 
 def _locate_problem(folder: Path, record: RunRecord, run_code: bool) -> ProblemSpec:

@@ -6,11 +6,9 @@ from pathlib import Path
 
 from nlp_gait.files import check_output, make_writable_folder, write_text
 
-MARK = b"nlp-gait"  # in the first lines of every file that is written
-
 
 def write_c_files(
-    folder: Path, package: str, templates: Mapping[str, str], words: Mapping[str, str], source: str
+    folder: Path, package: str, templates: Mapping[str, str], words: Mapping[str, str], source: str, force: bool
 ) -> list[Path]:
     """Write a C++ source and the files from templates; return their paths, the source's first.
 
@@ -20,9 +18,10 @@ def write_c_files(
         templates: by the name of the file, in which ``{prefix}`` is replaced by the word PREFIX.
         words: replacement of each ``@WORD@`` in the templates.
         source: of ``{prefix}.cpp``.
+        force: whether existing files are replaced.
 
     Raises:
-        OutputError: the folder cannot be written to, or has a file of another program under one of the names.
+        OutputError: the folder cannot be written to, or has a file under one of the names.
     """
     native, prefix = files(package) / "native", words["PREFIX"]
     texts = {f"{prefix}.cpp": source}
@@ -33,7 +32,7 @@ def write_c_files(
         texts[name.format(prefix=prefix)] = text
     paths = {make_writable_folder(folder) / name: text for name, text in texts.items()}
     for path in paths:
-        check_output(path, MARK)
+        check_output(path, force)
     for path, text in paths.items():
         write_text(path, text)
     return list(paths)

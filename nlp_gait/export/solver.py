@@ -21,7 +21,7 @@ BOUNDS = {"w_lower": "lbx", "w_upper": "ubx", "g_lower": "lbg", "g_upper": "ubg"
 
 
 @lock_casadi
-def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
+def export_solver(problem: GaitProblem, folder: Path, force: bool = False) -> list[Path]:
     """Write source, header, example and build line of a problem's NLP with its parameter values; return the files.
 
     Raises CompilerError for an operation without C++ code, or OutputError.
@@ -31,7 +31,7 @@ def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
     prefix = f"{problem.name.replace('-', '_')}_nlp"
     words = _format_words(problem, model, nlp_plan, prefix)
     source = _read_source(problem, model, nlp_plan, prefix)
-    return write_c_files(folder, "nlp_gait.export", TEMPLATES, words, source)
+    return write_c_files(folder, "nlp_gait.export", TEMPLATES, words, source, force)
 
 
 def _read_source(problem: GaitProblem, model: NlpModel, nlp_plan: NlpPlan, prefix: str) -> str:

@@ -22,10 +22,12 @@ TEMPLATES = {
 }
 
 
-def export_objective(instance: Instance, folder: Path) -> list[Path]:
+def export_objective(instance: Instance, folder: Path, force: bool = False) -> list[Path]:
     """Write source, header, example, callers and build line of an instance in physical units; raises OutputError."""
     instance = Instance(instance.id)
-    return write_c_files(folder, "nlp_gait.gaitbench", TEMPLATES, _make_words(instance), make_cpp_source(instance))
+    return write_c_files(
+        folder, "nlp_gait.gaitbench", TEMPLATES, _make_words(instance), make_cpp_source(instance), force
+    )
 
 
 def make_prefix(id: str) -> str:

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
-from nlp_gait.files import protect_input
 from nlp_gait.robots.meshes import (
     POINTER,
     check_pointer,
@@ -157,8 +156,6 @@ def _compile(path: str) -> Any:
     warnings, files = json.loads(texts)
     for text in warnings:
         LOG.warning("robot file %r: %s", path, text)
-    for file in files:
-        protect_input(Path(file))
     try:
         model = mujoco.MjModel.from_binary_path("robot.mjb", {"robot.mjb": data})
         for name in ("body_pos", "body_ipos", "body_mass", "body_inertia", "jnt_pos", "jnt_range", "qpos0"):

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
-from nlp_gait.files import protect_input
 from nlp_gait.robots.meshes import (
     find_mesh,
     list_shape_points,
@@ -192,8 +191,6 @@ def _read_xml(path: str) -> Any:
     elements = robot.findall("link") + robot.findall("joint")
     if len(elements) > MOST_PARTS:
         raise ValueError(f"it has {len(elements)} links and joints, more than {MOST_PARTS}; simplify the file")
-    for mesh in filter(None, (find_mesh(element.get("filename", ""), Path(path)) for element in robot.iter("mesh"))):
-        protect_input(mesh)
     return robot
 
 

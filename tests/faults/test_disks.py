@@ -14,7 +14,6 @@ import pytest
 from compare.study.record import read_record
 from compare.study.run import ProblemSpec, Run, Stop
 from compare.study.study import RECORDS, Study, name_record, run_study
-from nlp_gait.backends.kernel import library_cache
 from nlp_gait.export.formats import write_npz
 from nlp_gait.formulation import Signals
 from tests.compare.cli.calls import nlp_gait
@@ -83,14 +82,6 @@ def run_a_study(folder: Path, finished: Finished) -> None:
     finished(folder / "study.json")
 
 
-def store_a_library(folder: Path, finished: Finished) -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(library_cache.FOLDER_VARIABLE, str(folder / "cache"))
-        built = folder.parent / "library.so"
-        built.write_bytes(b"code" * 20)
-        finished(library_cache.store_library(built, "key"))
-
-
 class Journal:
     """Sees which files and folders below a folder are flushed, and refuses a rename of what may still be torn."""
 
@@ -130,7 +121,7 @@ class Journal:
         assert path.exists() and not self.unsure, f"{path} may be lost"
 
 
-@pytest.mark.parametrize("write", [write_arrays, run_a_study, store_a_library])
+@pytest.mark.parametrize("write", [write_arrays, run_a_study])
 def test_a_file_is_flushed_before_it_is_renamed_and_its_folder_after_that(
     write: Callable[[Path, Finished], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

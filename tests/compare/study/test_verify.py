@@ -6,6 +6,7 @@ import shutil
 import sys
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import pytest
 from compare.study.pack import INDEX, pack_study, unpack_archive
 from compare.study.run import ProblemSpec, Stop
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.study import Study, read_records, run_study, write_command
+from compare.study.study import Study, read_records, run_study, write_command, write_records
 from compare.study.verify import Verification, compute_chance, verify_study
 from nlp_gait.errors import InputError
 from tests.robots.custom import humanoid
@@ -94,6 +95,18 @@ def test_copied_points_missing_runs_and_damaged_records_are_named(sound: Path, t
     text = describe(verify_study(folder))
     assert "walk12, pso, run 0 differs" in text and "is not valid JSON" in text
     assert "walk12, ga, run 1 and 1 more missing" in text
+
+
+def test_runs_under_the_label_of_another_solver_are_named(sound: Path, tmp_path: Path) -> None:
+    records, _ = read_records(sound)
+    swapped = [replace(r, solver={"pso": "ga", "ga": "pso"}.get(r.solver, r.solver)) for r in records]
+    folder = tmp_path / "study"
+    folder.mkdir()
+    shutil.copy(sound / "study.json", folder)
+    write_records(swapped, folder)
+    assert "walk12, ga, run 0 differs it is of pso with seed 0, planned is ga with seed 0" in describe(
+        verify_study(folder)
+    )
 
 
 PROGRAM = """
