@@ -21,8 +21,8 @@ from nlp_gait.formulation.solution import ConstraintValue, Solution
 from nlp_gait.gaits.biped.body import TIMED_UNITS, Body
 from nlp_gait.gaits.biped.cycle_motion import STEP
 from nlp_gait.gaits.biped.footholds import list_arc, list_swings, parse_footholds, read_footholds
-from nlp_gait.gaits.biped.footstep_walk import name_speed
 from nlp_gait.gaits.biped.support_phases import compute_sole_margins
+from nlp_gait.gaits.biped.walk import name_speed
 from nlp_gait.gaits.biped.walk_sections import GREATEST_SPEED, HALF_STEPS, LEAST_SPEED, start_from_cycle
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.gaits.humanoid.turning import list_turn
@@ -260,7 +260,7 @@ def list_speeds(speeds_m_s: Sequence[float], steps: int) -> dict[str, float]:
             f"{len(speeds)} speeds are given, and a walk of {steps} steps has {count} inner ones; plan more steps"
         )
     inner = np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(speeds)), speeds)
-    return {name_speed(end, k): v for k, v in enumerate(inner.tolist(), 2) for end in ("least", "greatest")}
+    return {name_speed(end, f"step{k}_"): v for k, v in enumerate(inner.tolist(), 2) for end in ("least", "greatest")}
 
 
 def _check_positive(**values: float | None) -> None:

@@ -12,7 +12,7 @@ From a robot to the first constraint, in reading order:
     Goal      what is minimised: power, torques or smoothness (``goals.py``)
     Assembly  objective, rows and indexes of a problem (``nlp_gait.formulation``)
 
-``support_phases.py`` composes a phase, ``cycle.py`` joins both by the switches of ``switch.py``, ``walk.py`` and
-``footstep_walk.py`` more phases; ``phase_problem.py`` makes the problem. ``problems.py`` and ``walking.py`` declare the options.
+``support_phases.py`` composes a phase, ``cycle.py`` joins both by the switches of ``switch.py``, ``walk.py`` more phases;
+``phase_problem.py`` makes the problem. ``problems.py`` and ``walking.py`` declare the options.
 ``nao/recorded_phase.py`` is a phase whose joints' motion is recorded.
 """

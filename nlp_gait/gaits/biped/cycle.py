@@ -15,11 +15,12 @@ from nlp_gait.formulation.assembly import Objective, Parameter, Point, Variable,
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import TIMES, Body, Support
 from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, make_cycle_planners, make_cycle_variables
+from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import BalanceMargins, Box, compute_margins, make_rows
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase, make_start_within_reach
 from nlp_gait.gaits.biped.samples import Loader
-from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, MotionSection, Sequence
+from nlp_gait.gaits.biped.sequence import BALANCE, ENERGY_PER_METRE, End, MotionSection, Sequence
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
 from nlp_gait.gaits.biped.switch import SOFT_LANDING, TORQUE_JUMP, Switch
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
@@ -32,11 +33,17 @@ LEAST_SPEED = 1e-4  # [m/s]
 NO_JUMP_LIMIT = 1000.0  # of NAO [Nm]
 
 
+# Its plans read states and places of the feet themselves.
+SECTIONS = tuple(
+    MotionSection(kind, kind, End(), End(), (Foothold(0.0, 0.0, 0.0),) * 2, time) for kind, time in TIMES.items()
+)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WalkingCycle(Sequence):
     """A cycle sampled over both phases; of the variables, the step length is the last one."""
 
-    sections: tuple[MotionSection, ...] = CYCLE
+    sections: tuple[MotionSection, ...] = SECTIONS
     touch_down: Switch = SOFT_LANDING
     at_given_speed: bool  # the step length is no decision variable but follows from the speed
 
@@ -126,14 +133,14 @@ def make_walking_cycle(
     )
 
 
-def make_cycle_margins(body: Body) -> dict[Support, BalanceMargins]:
-    """Return the balance margins of each phase."""
+def make_cycle_margins(body: Body, right_x: str = STEP) -> dict[Support, BalanceMargins]:
+    """Return the balance margins of each phase; ``right_x`` is the place of the right foot in double support."""
     feet, (left_y, right_y) = body.robot.feet, body.feet_y
     usual = make_support_box(body.robot, {"L": (0.0, left_y), "R": (body.step_length_m, right_y)})
 
     def double(zmp: MX, point: Point, ops: Nonsmooth) -> tuple[MX, MX]:
         """In the box around the left foot and the right one a step ahead."""
-        step = point[STEP]
+        step = point[right_x]
         back = ca.fmin(-feet["left"].back_m, step - feet["right"].back_m)
         front = ca.fmax(feet["left"].front_m, step + feet["right"].front_m)
         return compute_margins(Box(back=back, front=front, right=usual.right, left=usual.left), zmp, ops)

@@ -11,7 +11,7 @@ from numpy.polynomial import Polynomial
 from nlp_gait.errors import InputError
 from nlp_gait.formulation.display import Tread
 from nlp_gait.robots import Foot
-from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion
 
 # Shares of a swing's path over time: forward at rest and unaccelerated at both ends, upward at rest, and its bow.
 FORWARD, UPWARD = Polynomial([0, 0, 0, 10, -15, 6]), Polynomial([0, 0, 3, -2])
@@ -48,17 +48,14 @@ class Flight:
         """Rise for each metre."""
         return self.rise_m / self.run_m
 
-    def swing(self, start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, duration: SX, s: SX) -> Motion:
-        """Return the motion (3,) of a swinging ankle from tread to tread and rest to rest, with a bow of height ``lift`` [m]."""
+    def swing(self, start_x: SX, end_x: SX, lift: SX, duration: SX, s: SX) -> tuple[Motion, Motion]:
+        """Return the share of its path that a foot has swung from tread to tread, and its height, with a bow of ``lift`` [m]."""
 
-        def along(shape: Polynomial, start: SX | float, way: SX) -> Motion:
-            orders = (ca.polyval(DM(shape.deriv(k).coef[::-1]), s) / duration**k for k in range(3))
-            position, *rates = (way * order for order in orders)
-            return Motion(start + position, *rates)
+        def shape(polynomial: Polynomial, factor: SX) -> Motion:
+            return Motion(*(factor * ca.polyval(DM(polynomial.deriv(k).coef[::-1]), s) / duration**k for k in range(3)))
 
-        way = end_x - start_x
-        up = along(UPWARD, ankle_height + self.slope * start_x, self.slope * way)
-        return stack(along(FORWARD, start_x, way), constant_motion(y), add_motions(up, along(BOW, 0.0, lift)))
+        rise = add_motions(constant_motion(self.slope * start_x), shape(UPWARD, self.slope * (end_x - start_x)))
+        return shape(FORWARD, SX(1)), add_motions(rise, shape(BOW, lift))
 
     def find_least_lift(self, treads: int) -> float:
         """Return the least bow of a swing by so many treads, of two if it passes the standing foot, over all edges [m].

@@ -21,9 +21,11 @@ from nlp_gait.formulation import (
     Signals,
     Variable,
 )
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
+from nlp_gait.gaits.biped.body import LIFT, Body, Support
+from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Samples
+from nlp_gait.gaits.biped.switch import make_state_variables
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
@@ -31,10 +33,21 @@ ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
 BALANCE = tuple(f"dbm_{axis}_{kind}_limit_m" for kind in ("min", "mean") for axis in "xy")
 
 
+class State(NamedTuple):
+    """A state between two phases, whose variables are those of a switch of the cycle."""
+
+    name: str  # in names of variables
+    switch: str  # of the cycle, whose bounds they have
+
+    def make_variables(self, body: Body) -> list[Variable]:
+        """Return the variables of the state."""
+        return make_state_variables(body, self.name, self.switch)
+
+
 class End(NamedTuple):
     """Where a phase begins or ends."""
 
-    state: int | None = None  # by index; None for the pose in which the robot stands
+    state: State | None = None  # None for the pose in which the robot stands
     mirrored: bool = False  # the mirror image, as seen from the foot that has just landed
 
 
@@ -45,19 +58,11 @@ class MotionSection(NamedTuple):
     kind: Support
     begin: End
     end: End
-    feet: tuple[Any, Any]  # places of the right foot at begin and end, in step lengths; or its footholds
+    feet: tuple[Foothold, Foothold]  # of the right foot at begin and end; in step lengths if these are variable
     duration: str  # variable of the motion
     lift: str = LIFT  # variable of the motion: height of a swing
     step: int = 1  # to which it belongs
     occurs: int = 1  # how often it occurs; 0 for a pose, of which only the limits count
-
-
-LIFT_OFF, TOUCH_DOWN = End(0), End(1)
-CYCLE_END = End(0, mirrored=True)
-CYCLE = (
-    MotionSection(Support.SINGLE, Support.SINGLE, LIFT_OFF, TOUCH_DOWN, (-1, 1), TIMES[Support.SINGLE]),
-    MotionSection(Support.DOUBLE, Support.DOUBLE, TOUCH_DOWN, CYCLE_END, (1, 1), TIMES[Support.DOUBLE]),
-)
 
 
 class AssembledSections(NamedTuple):

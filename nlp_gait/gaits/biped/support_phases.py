@@ -6,12 +6,13 @@ Phases of sections 3 and 4 of Gupta, Pratihar, Deb (2023), with the margins of t
 from collections.abc import Mapping
 from typing import NamedTuple, TypeAlias
 
-from casadi import SX
+from casadi import MX, SX
 
-from nlp_gait.formulation import Grid, InstantPoint
+from nlp_gait.formulation import Array, Grid, InstantPoint, Point
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support, read_duration
 from nlp_gait.gaits.biped.bounds import make_hip_variables, make_lift_variable, make_time_variable
 from nlp_gait.gaits.biped.curves import Trajectory, move_hip
+from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, Margins, SplineClearance, compute_margins
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
@@ -25,6 +26,7 @@ from nlp_gait.symbolic.trajectories import Motion
 # Least mean margins: 0.05 m and 0.02 m on NAO's sole of 0.15 m by 0.08 m (section 4.1); 0.08 m in the box of 0.21 m by 0.18 m
 # around both soles (section 4.2).
 SOLE_SHARES, BOX_SHARES = (1 / 3, 1 / 4), (8 / 21, 4 / 9)
+LEAST_SLANT = 1e-2  # component of a side's normal along an axis, below which there is no distance to the side along it
 
 Point2: TypeAlias = tuple[float, float]
 
@@ -62,6 +64,24 @@ def limit_to_box(box: Box[float], margins: Margins | None = None) -> BalanceMarg
         margins or (lambda zmp, point, ops: compute_margins(box, zmp, ops)),
         compute_mean_margins(BOX_SHARES, box.front - box.back, box.left - box.right),
     )
+
+
+def limit_to_hull(body: Body, right_sole: Array) -> BalanceMargins:
+    """Return the limit of the ZMP in the hull of both soles: the left one at x = 0, and the right one with these corners (4, 2).
+
+    Margins are distances to the sides along x and y; the mean ones are those of a single sole.
+    """
+    soles = body.robot.feet
+    sides = find_support_sides([Foothold(0.0, body.feet_y[0], 0.0).outline(soles["left"]), right_sole]).tolist()
+
+    def margins(zmp: MX, point: Point, ops: Nonsmooth) -> tuple[MX, MX]:
+        def measure(axis: int) -> MX:
+            slanted = [side for side in sides if abs(side[axis]) > LEAST_SLANT]
+            return ops.min(*(((d - x * zmp[0, :] - y * zmp[1, :]) / abs((x, y)[axis])).T for x, y, d in slanted)).T
+
+        return measure(0), measure(1)
+
+    return BalanceMargins(margins, compute_sole_margins(soles["left"]))
 
 
 class Stance(NamedTuple):

@@ -1,56 +1,48 @@
 """A whole walk from standing to standing: weight shift, first half step, steps, last half step, weight shift.
 
-All inner steps are the same cycle, whose states at both switches are variables; the start ends in the cycle's state, and the stop
-begins there. So the size of the problem does not depend on the number of steps, and hip, feet and joints have continuous
-positions and velocities for any x. A walk of two half steps has no inner step, and neither variables nor rows of one.
+A straight walk is one along equal footholds, whose distance is a variable; its inner steps are one cycle (``walk_sections.py``).
+Other footholds are given, so that a walk can turn: each step then has its own states, and the torso's yaw is the mean of both
+feet's. Hip, feet and joints have continuous positions and velocities for any x.
 """
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from casadi import MX, SX
 
-from nlp_gait.errors import check_count
-from nlp_gait.formulation import (
-    Array,
-    Assembly,
-    Constraint,
-    GaitProblem,
-    Grid,
-    Point,
-    Signals,
-    SolverHints,
-    Variable,
-)
+from nlp_gait.errors import InputError, check_count
+from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Grid, Point, Signals, SolverHints, Variable
 from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter, make_parameters
-from nlp_gait.formulation.display import Tread
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
+from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body, Support
 from nlp_gait.gaits.biped.bounds import make_lift_variable
 from nlp_gait.gaits.biped.cycle import make_cycle_margins
 from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner
 from nlp_gait.gaits.biped.flight import Flight
-from nlp_gait.gaits.biped.footholds import Foothold
+from nlp_gait.gaits.biped.footholds import Foothold, list_feet
 from nlp_gait.gaits.biped.limits import BalanceMargins, RowsAndIndexes
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_goal, make_phase
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
-from nlp_gait.gaits.biped.sequence import CYCLE, End, MotionSection, Sequence
-from nlp_gait.gaits.biped.support_phases import limit_to_box, make_support_box, swing_foot
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Planner
+from nlp_gait.gaits.biped.sequence import End, MotionSection
+from nlp_gait.gaits.biped.sequence import Sequence as PhaseSequence
+from nlp_gait.gaits.biped.support_phases import (
+    compute_sole_margins,
+    limit_to_box,
+    limit_to_hull,
+    limit_to_sole,
+    make_support_box,
+)
 from nlp_gait.gaits.biped.switch import read_state
 from nlp_gait.gaits.biped.walk_sections import (
     DURATION,
-    GREATEST_SPEED,
     HALF_STEPS,
-    LEAST_SPEED,
-    RIGHT_FROM,
     STAND,
-    STATES,
-    State,
+    list_equal_footholds,
     list_sections,
     make_phase_variables,
     make_walk_start,
@@ -58,48 +50,64 @@ from nlp_gait.gaits.biped.walk_sections import (
 )
 from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic, parabola_lift, stack
 
 MOST_STEPS = 1000
 NO_LIMIT = 100.0  # [m/s]
 STEPS = "step_count"  # parameter, so that compiled functions suit walks of any length
+# Last variables of a phase: the right foot's foothold at both ends, seen from the left foot; of a straight walk x alone.
+RIGHT = tuple(f"right_{end}_{what}" for end in ("from", "to") for what in ("x_m", "y_m", "yaw_rad"))
+# Of the sole in x and y, least distance of the ZMP from its edges in single support between given footholds: without it, JVRC-1
+# falls after a turn.
+LEAST_SHARE = 1 / 4
+
+
+def name_speed(end: str, prefix: str = "") -> str:
+    """Return the name of the parameter that limits the speed of inner steps; ``end`` is least or greatest."""
+    return f"{prefix}{end}_speed_m_s"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class WholeWalk(Sequence):
-    """A walk sampled over its distinct phases; inner steps are counted as often as they occur."""
+class WholeWalk(PhaseSequence):
+    """A walk sampled over its distinct phases; inner steps of a straight one are counted as often as they occur."""
 
-    steps: int  # swings, the half steps included
-    states: tuple[State, ...] = STATES  # between its phases
+    feet: tuple[Foothold, ...]  # right and left foot at the start, then where each step lands
+    equal: bool  # whether the walk is straight: footholds are in step lengths, and inner steps are one cycle
     flight: Flight | None = None  # of stairs, one tread for each step length
+
+    @property
+    def steps(self) -> int:
+        """Number of swings, the half steps included."""
+        return len(self.feet) - 2
 
     @property
     def rise_m(self) -> float:
         """Height that each step gains."""
         return 0.0 if self.flight is None else self.flight.rise_m
 
+    def _get_scale(self, point: Any) -> Any:
+        """Return the unit of the footholds' x [m]."""
+        return point[STEP] if self.equal else 1.0
+
     @property
-    def has_cycle(self) -> bool:
-        """Whether inner steps are a cycle."""
-        return any(section.name == Support.SINGLE for section in self.sections)
+    def inner_steps(self) -> dict[str, tuple[MotionSection, MotionSection]]:
+        """Single and double support of each distinct inner step, by what their names begin with."""
+        pairs = zip(self.sections, self.sections[1:], strict=False)
+        swings = [(single, double) for single, double in pairs if single.kind is Support.SINGLE]
+        return {single.name.removesuffix(Support.SINGLE): (single, double) for single, double in swings[1:-1]}
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters of all phases; those of balance begin with the kind of the phase."""
-        count = make_parameters(
-            (STEPS, "1", float(self.steps), "number of steps; set by the option steps", self.steps, self.steps)
-        )
+        steps = (STEPS, "1", float(self.steps), "number of steps; set by the option steps", self.steps, self.steps)
+        speeds = [
+            (name_speed(end, prefix), "m/s", limit, f"{end} speed of {words}", 0.0, NO_LIMIT)
+            for end, limit in (("least", 0.0), ("greatest", NO_LIMIT))
+            for prefix in self.inner_steps
+            for words in (prefix.rstrip("_") or "the inner steps",)
+        ]
         bounds_last = sorted(self.phase_parameters, key=lambda p: p.name.endswith((".lower", ".upper")))
-        return (*count, *self.speed_limits, *bounds_last)
-
-    @property
-    def speed_limits(self) -> tuple[Parameter, ...]:
-        """Parameters of the inner steps' speed."""
-        if not self.has_cycle:
-            return ()
-        return make_parameters(
-            (LEAST_SPEED, "m/s", 0.0, "least speed of the inner steps", 0.0, NO_LIMIT),
-            (GREATEST_SPEED, "m/s", NO_LIMIT, "greatest speed of the inner steps (no limit by default)", 0.0, NO_LIMIT),
-        )
+        return (*make_parameters(steps, *speeds), *bounds_last)
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
         """Return energy per metre, rows and indexes."""
@@ -110,8 +118,11 @@ class WholeWalk(Sequence):
             sum((values[name] * count for name, count in often.items()), MX(0))
             for values in (sections.energies, sections.times)
         )
-        distance = self.find_distance(point, inner)
-        speeds, indexes = self.limit_speed(point, sections.times, sections.energies)
+        # The mean of the lengths of both feet's paths.
+        swings = [section for section in self.sections if section.kind is Support.SINGLE]
+        advance = sum((compute_advance(swing) * often[swing.name] for swing in swings), MX(0))
+        distance = advance * self._get_scale(point)
+        speeds, indexes = self._limit_speeds(point, sections.times, sections.energies)
         return Assembly(
             objective=energy / distance,
             constraints=(*sections.rows, *speeds),
@@ -125,32 +136,42 @@ class WholeWalk(Sequence):
             },
         )
 
-    def find_distance(self, point: Point, inner: MX) -> MX:
-        """Return the distance that the feet advance with so many inner steps [m]."""
-        return (inner + 1) * point[STEP]
+    def _limit_speeds(self, point: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
+        """Return rows of the inner steps: what both feet advance on average in a swing and the double support after it."""
+        rows, indexes = list[Constraint](), dict[str, MX]()
+        for prefix, pair in self.inner_steps.items():
+            time, energy = (sum((values[section.name] for section in pair), MX(0)) for values in (times, energies))
+            advance = compute_advance(pair[0]) * self._get_scale(point)
+            least, greatest = (point[name_speed(end, prefix)] for end in ("least", "greatest"))
+            row = Constraint(
+                name=f"{prefix}speed", unit="m/s", scale=0.01, value=advance / time, lower=least, upper=greatest
+            )
+            rows.append(replace(row, over="once"))
+            if self.equal:
+                indexes = {"speed_m_s": advance / time, "cycle_energy_J_per_m": energy / advance}
+        return rows, indexes
 
-    def limit_speed(self, point: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
-        """Return the row and the indexes of the inner steps."""
-        if not self.has_cycle:
-            return (), {}
-        time, energy = (sum((values[section.name] for section in CYCLE), MX(0)) for values in (times, energies))
-        row = make_speed_row("speed", point[STEP] / time, point[LEAST_SPEED], point[GREATEST_SPEED])
-        return (row,), {"speed_m_s": point[STEP] / time, "cycle_energy_J_per_m": energy / point[STEP]}
+    def limit_section(self, section: MotionSection) -> Phase:
+        """Return the phase with the limits of a section: between given footholds, the ZMP is in the hull of both soles."""
+        phase = self.phases[section.kind]
+        if section.kind is not Support.DOUBLE or self.equal:
+            return phase
+        hull = limit_to_hull(self.body, section.feet[1].outline(self.body.robot.feet["right"]))
+        return replace(
+            phase, limits=tuple(hull if isinstance(limit, BalanceMargins) else limit for limit in phase.limits)
+        )
 
     def read_section(self, section: MotionSection, point: Any) -> Any:
         """Return the point of one phase: its own variables, see ``make_phase_variables``, from those of the walk."""
-        feet, landed = self.place_right_foot(section, point)
+        scale = self._get_scale(point)
+        lifted, landed = (foot._replace(x=foot.x * scale) for foot in section.feet)
         values = [value for end in (section.begin, section.end) for value in self._read_end(end, landed, point)]
         lift = point[section.lift] if section.kind is Support.SINGLE else 0.0
-        x = ca.vertcat(*values, lift, ca.fmax(point[section.duration], LEAST_DURATION), *feet)
+        right = (lifted.x, landed.x) if self.equal else (*lifted, *landed)
+        x = ca.vertcat(*values, lift, ca.fmax(point[section.duration], LEAST_DURATION), *right)
         names = self.phases[Support.SINGLE].names
         parameters = {name: place for name, place in point.positions.items() if place[0] == "p"}
         return replace(point, x=x, positions=parameters | {name: ("x", i) for i, name in enumerate(names)})
-
-    def place_right_foot(self, section: MotionSection, point: NumericPoint) -> tuple[list[Any], Foothold]:
-        """Return the last variables of a section's phase, and where the right foot is at its end, seen from the left one."""
-        begin, end = (share * point[STEP] for share in section.feet)
-        return [begin, end], Foothold(end, self.body.feet_y[1], 0.0)
 
     def _read_end(self, end: End, landed: Foothold, point: NumericPoint) -> list[Any]:
         """Values of a state in the order of ``make_state_variables``, seen from the standing foot."""
@@ -160,7 +181,7 @@ class WholeWalk(Sequence):
             ahead = landed._replace(yaw=landed.yaw / 2).turn(point[f"hip_x_{STAND}_m"], 0.0)
             place = [middle / 2 + offset for middle, offset in zip((landed.x, landed.y + left_y), ahead, strict=True)]
             return [*place, point[f"hip_z_{STAND}_m"], 0, 0, 0, *(v for angle in symmetric for v in (angle, 0))]
-        x, y, z, vx, vy, vz, *angles = (point[v.name] for v in self.states[end.state].make_variables(self.body))
+        x, y, z, vx, vy, vz, *angles = (point[v.name] for v in end.state.make_variables(self.body))
         if not end.mirrored:
             return [x, y, z, vx, vy, vz, *angles]
         images = [c.image for c in coordinates for _ in range(2)]
@@ -168,37 +189,107 @@ class WholeWalk(Sequence):
         mirrored = (image * angle for image, angle in zip(images, angles, strict=True))
         return [landed.x + place_x, landed.y + place_y, z + self.rise_m, *velocity, vz, *mirrored]
 
-    def place_steps(self, point: NumericPoint) -> Array:
-        """Return the places (K, 4) of the standing feet: x, y, z [m] and yaw [rad]."""
-        return np.outer(range(self.steps), [float(point[STEP]), 0.0, self.rise_m, 0.0])
-
     def signals(self, point: NumericPoint) -> Signals:
         """Return time histories of the whole walk at a point of numbers."""
-        return join_steps(self.list_step_signals(point), self.body.robot, self.place_steps(point))
+        places, scale = [], float(self._get_scale(point))
+        for k, stance in enumerate(self.feet[1:-1]):
+            x, y = stance.turn(0.0, -self.body.feet_y[k % 2])
+            places.append((scale * (stance.x + x), stance.y + y, k * self.rise_m, stance.yaw))
+        return join_steps(self.list_step_signals(point), self.body.robot, np.array(places))
 
 
-def make_speed_row(name: str, speed: MX, least: MX, greatest: MX) -> Constraint:
-    """Return the row that keeps a speed between limits [m/s]."""
-    return Constraint(name=name, unit="m/s", scale=0.01, value=speed, lower=least, upper=greatest, over="once")
+def compute_advance(swing: MotionSection) -> float:
+    """Return half the way of a swinging foot, in the unit of its footholds."""
+    lifted, landed = swing.feet
+    return math.dist(lifted[:2], landed[:2]) / 2
 
 
-def make_walk_phases(
+def make_walk_planner(
+    body: Body, right: Sequence[str], *, swings: bool, turning: bool, flight: Flight | None
+) -> Planner:
+    """Return the plan of a phase over the left foot: the right one swings straight to its foothold, or stands on it.
+
+    Its places at both ends are the variables ``right``.
+    """
+    _, height = body.ankle("R")
+    straight = len(right) == 2
+
+    def read(point: InstantPoint, phase: SX) -> PhaseMotion:
+        begin, end = (read_state(point, name, body.coordinates) for name in ("begin", "end"))
+        half, duration = len(right) // 2, point[DURATION]
+        lifted, landed = ([point[name] for name in names] for names in (right[:half], right[half:]))
+        share, rise = constant_motion(1.0), constant_motion(0.0 if flight is None else flight.slope * landed[0])
+        if swings and flight is not None:
+            share, rise = flight.swing(lifted[0], landed[0], point[LIFT], duration, phase)
+        elif swings:
+            share = cubic(SX(0), SX(1), SX(0), SX(0), duration, phase)
+            rise = parabola_lift(share, 0.0, 1.0, point[LIFT])
+        x, *others = (
+            Motion(a + (b - a) * share[0], *((b - a) * s for s in share[1:]))
+            for a, b in zip(lifted, landed, strict=True)
+        )
+        y, yaw = (constant_motion(body.feet_y[1]), constant_motion(0.0)) if straight else others
+        foot = stack(x, y, rise._replace(position=rise.position + height))
+        turns = {TORSO_YAW: Motion(*(order / 2 for order in yaw)), RIGHT_YAW: yaw} if turning else {}
+        return PhaseMotion(begin, end, duration, foot, turns)
+
+    return make_planner(body, read)
+
+
+def plan_straight_walk(body: Body, steps: int, grid: Grid, flight: Flight | None = None) -> GaitProblem:
+    """Return the problem of a straight walk of least energy per metre, up a flight of stairs if it is given."""
+    steps = check_count("steps", steps, at_least=HALF_STEPS, at_most=MOST_STEPS)
+    footholds, right = list_equal_footholds(steps, body.feet_y), tuple(name for name in RIGHT if name.endswith("x_m"))
+    walk = _make_walk(body, footholds, make_cycle_margins(body, right[1]), right, grid, flight)
+    if flight is None:
+        return make_walk_problem(walk)
+    flight.check_run(next(variable.upper for variable in walk.variables if variable.name == STEP))
+    variables = tuple(_raise_lift(v, body, flight) for v in walk.variables)
+    return make_walk_problem(replace(walk, variables=variables)).fix(**{STEP: flight.run_m})
+
+
+def plan_footstep_walk(body: Body, footholds: tuple[Foothold, ...], steps: int, grid: Grid) -> GaitProblem:
+    """Return the problem of a walk along given footholds, the right foot's first, with least energy per metre."""
+    if steps != len(footholds):
+        raise InputError(f"steps must be the number of footholds, {len(footholds)}, got {steps}")
+    left_xy, least = (0.0, body.feet_y[0]), compute_sole_margins(body.robot.feet["left"], (LEAST_SHARE, LEAST_SHARE))
+    side = Foothold(0.0, body.feet_y[1], 0.0).outline(body.robot.feet["right"])
+    margins = {Support.SINGLE: limit_to_sole(body, left_xy, least), Support.DOUBLE: limit_to_hull(body, side)}
+    return make_walk_problem(_make_walk(body, footholds, margins, RIGHT, grid))
+
+
+def _make_walk(
     body: Body,
-    variables: tuple[Variable, ...],
-    planners: list[Planner],
+    footholds: tuple[Foothold, ...],
     margins: Mapping[Support, BalanceMargins],
+    right: tuple[str, ...],
     grid: Grid,
-    loads: Loader,
-) -> dict[Support, Phase]:
-    """Return the phases by kind; planners are those of a right foot that stands, with loads, and of one that swings."""
-    goal = make_goal(body, "power")
-    box = make_support_box(body.robot, {"L": (0.0, body.feet_y[0]), "R": (0.0, body.feet_y[1])})
-    balance = {**margins, Support.STAND: limit_to_box(box)}
-    fields: dict[str, Any] = {"variables": variables, "duration": DURATION, "grid": grid, "goal": goal}
-    return {
-        kind: make_phase(body, kind, limit, loads, plan=planners[kind is Support.SINGLE], **fields)
-        for kind, limit in balance.items()
+    flight: Flight | None = None,
+) -> WholeWalk:
+    """Return a walk; ``margins`` are those of single and double support, ``right`` the last variables of its phases."""
+    turning, equal = any(foothold.yaw for foothold in footholds), right != RIGHT
+    loads = make_divided_loads(body, "lever")
+    body = replace(body, upright=frozenset()) if turning else body  # a swinging foot turns
+    goal, box = (
+        make_goal(body, "power"),
+        make_support_box(body.robot, {side: (0.0, body.ankle(side)[0]) for side in "LR"}),
+    )
+    plans = [make_walk_planner(body, right, swings=swings, turning=turning, flight=flight) for swings in (False, True)]
+    fields: dict[str, Any] = {"variables": make_phase_variables(body, right), "duration": DURATION, "grid": grid}
+    phases = {
+        kind: make_phase(body, kind, balance, loads, plan=plans[kind is Support.SINGLE], goal=goal, **fields)
+        for kind, balance in {**margins, Support.STAND: limit_to_box(box)}.items()
     }
+    sections = list_sections(footholds, body.feet_y, equal=equal)
+    return WholeWalk(
+        body=body,
+        variables=make_walk_variables(body, sections, equal=equal),
+        phases=phases,
+        sections=tuple(sections),
+        feet=list_feet(footholds, body.feet_y),
+        equal=equal,
+        flight=flight,
+    )
 
 
 def _raise_lift(variable: Variable, body: Body, flight: Flight) -> Variable:
@@ -209,43 +300,10 @@ def _raise_lift(variable: Variable, body: Body, flight: Flight) -> Variable:
     return replace(variable, lower=least, upper=round(least + make_lift_variable(body).upper, 4))
 
 
-def plan_whole_walk(body: Body, steps: int, grid: Grid, flight: Flight | None = None) -> GaitProblem:
-    """Return the problem of a whole walk of least energy per metre, up a flight of stairs if it is given."""
-    swing, slope = (swing_foot, 0.0) if flight is None else (flight.swing, flight.slope)
-
-    def read(point: InstantPoint, phase: SX, swings: bool) -> PhaseMotion:
-        begin, end = (read_state(point, name, body.coordinates) for name in ("begin", "end"))
-        step, duration = point[STEP], point[DURATION]
-        foot = body.standing_ankle("R", step, slope * step)
-        if swings:
-            foot = swing(point[RIGHT_FROM], step, *body.ankle("R"), point[LIFT], duration, phase)
-        return PhaseMotion(begin, end, duration, foot)
-
-    steps = check_count("steps", steps, at_least=HALF_STEPS, at_most=MOST_STEPS)
-    planners = [make_planner(body, partial(read, swings=swings)) for swings in (False, True)]
-    margins, loads = make_cycle_margins(body), make_divided_loads(body, "lever")
-    phases = make_walk_phases(body, make_phase_variables(body), planners, margins, grid, loads)
-    variables = make_walk_variables(body, steps)
-    walk = WholeWalk(
-        body=body, steps=steps, variables=variables, phases=phases, sections=list_sections(steps), flight=flight
-    )
-    if flight is None:
-        return make_walk_problem(walk, variables)
-    flight.check_run(next(variable.upper for variable in variables if variable.name == STEP))
-    variables = tuple(_raise_lift(v, body, flight) for v in variables)
-    treads = flight.list_treads(steps - 1)
-    return make_walk_problem(replace(walk, variables=variables), variables, lambda point: treads).fix(
-        **{STEP: flight.run_m}
-    )
-
-
-def make_walk_problem(
-    walk: WholeWalk,
-    started: tuple[Variable, ...],
-    ground: Callable[[NumericPoint], tuple[Tread, ...]] | None = None,
-) -> GaitProblem:
-    """Return the problem of a walk; start points are shares of the bounds of the variables ``started``."""
-    start = make_walk_start(walk.body, started, walk.states, walk.sections)
-    hints = SolverHints(start=start, starts=3, searchable=False)
+def make_walk_problem(walk: WholeWalk) -> GaitProblem:
+    """Return the problem of a walk."""
+    hints = SolverHints(start=make_walk_start(walk.body, walk.variables, walk.sections), starts=3, searchable=False)
+    treads = () if walk.flight is None else walk.flight.list_treads(walk.steps - 1)
     title = "walk from standing to standing: least energy per metre"
+    ground = None if walk.flight is None else lambda _: treads
     return make_gait_problem(walk, "walk", title, hints, steps=walk.steps, ground=ground)

@@ -1,4 +1,9 @@
-"""The phases of a whole walk, each over the left foot at x = 0, their states, the variables of both, and their start points."""
+"""The phases of a whole walk along footholds, each over the left foot at x = 0, their variables, and start points.
+
+Each step is seen from its standing foot, mirrored if that is the right one. Along equal footholds all inner steps are the same
+cycle, whose states at both switches are variables: the start ends in the cycle's state, and the stop begins there. So the size of
+the problem does not depend on the number of steps. Otherwise every step has its own states.
+"""
 
 import json
 import math
@@ -6,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,96 +18,96 @@ from nlp_gait.formulation import Array, GaitProblem, Variable
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
 from nlp_gait.gaits.biped.bounds import make_lift_variable, make_usual_bounds
 from nlp_gait.gaits.biped.cycle_motion import STEP, make_cycle_variables
-from nlp_gait.gaits.biped.sequence import CYCLE, CYCLE_END, LIFT_OFF, End, MotionSection
-from nlp_gait.gaits.biped.switch import SWITCHES, make_state_variables
+from nlp_gait.gaits.biped.footholds import Foothold, list_swings
+from nlp_gait.gaits.biped.sequence import End, MotionSection, State
+from nlp_gait.gaits.biped.switch import make_state_variables
 
-STAND = Support.STAND.value  # first pose, and state of its variables
+STAND, STAND_AT_END = Support.STAND.value, "stand_at_end"  # first pose, and state of its variables; last pose
 SHIFT = "shift_time_s"
 HALF_STEPS = 2  # the first and the last step are half steps
 LEAST_SPEED, GREATEST_SPEED = "least_speed_m_s", "greatest_speed_m_s"  # parameters: of the inner steps
-DURATION, RIGHT_FROM = "duration_s", "right_from_m"  # variables of a phase besides those of its first and last state
+DURATION = "duration_s"  # variable of a phase besides those of its first and last state
 
+BESIDE = 1e-6  # [m, rad]; feet this close to their places at the start stand side by side
 START_NOISE = 0.002  # of start points, as a share of the bounds' ranges
 
 
-class State(NamedTuple):
-    """A state between two phases, whose variables are those of a switch of the cycle."""
-
-    name: str  # in names of variables
-    switch: str  # of the cycle, whose bounds they have
-
-    def make_variables(self, body: Body) -> list[Variable]:
-        """Return the variables of the state."""
-        return make_state_variables(body, self.name, self.switch)
-
-    def find_alike(self, body: Body) -> dict[str, str]:
-        """Return the cycle's variable for each of the state's."""
-        variables, cycle = self.make_variables(body), make_state_variables(body, self.switch, self.switch)
-        return {variable.name: like.name for variable, like in zip(variables, cycle, strict=True)}
+def list_equal_footholds(steps: int, feet_y: tuple[float, float]) -> tuple[Foothold, ...]:
+    """Return the footholds of a straight walk, in step lengths; the last foot closes."""
+    return tuple(Foothold(float(min(k, steps - 1)), feet_y[k % 2], 0.0) for k in range(1, steps + 1))
 
 
-STATES = (
-    *(State(switch, switch) for switch in SWITCHES),
-    State("start_lift_off", "lift_off"),
-    State("start_touch_down", "touch_down"),
-    State("stop_touch_down", "touch_down"),
-)
-START_LIFT_OFF, START_TOUCH_DOWN, STOP_TOUCH_DOWN = map(End, range(len(SWITCHES), len(STATES)))
+def list_sections(footholds: Sequence[Foothold], feet_y: tuple[float, float], *, equal: bool) -> list[MotionSection]:
+    """Return the phases of a walk in the order of time; along equal footholds the inner steps are one cycle."""
+    swings, count = list_swings(footholds, feet_y), len(footholds)
+    if equal:
+        inner = {2: ("", count - HALF_STEPS)} if count > HALF_STEPS else {}
+        steps = {1: ("start_", 1), **inner, count: ("stop_", 1)}
+    else:
+        steps = {k: (f"step{k}_", 1) for k in range(1, count + 1)}
 
-_SINGLE, _DOUBLE = TIMES[Support.SINGLE], TIMES[Support.DOUBLE]
-START = (
-    MotionSection(STAND, Support.STAND, End(), End(), (0, 0), SHIFT, occurs=0),
-    MotionSection("shift", Support.STAND, End(), START_LIFT_OFF, (0, 0), SHIFT),
-    MotionSection(
-        "start_ssp", Support.SINGLE, START_LIFT_OFF, START_TOUCH_DOWN, (0, 1), f"start_{_SINGLE}", f"start_{LIFT}"
-    ),
-    MotionSection("start_dsp", Support.DOUBLE, START_TOUCH_DOWN, CYCLE_END, (1, 1), f"start_{_DOUBLE}"),
-)
-STOP = (
-    MotionSection(
-        "stop_ssp", Support.SINGLE, LIFT_OFF, STOP_TOUCH_DOWN, (-1, 0), f"stop_{_SINGLE}", f"stop_{LIFT}", step=3
-    ),
-    MotionSection("stop_dsp", Support.STAND, STOP_TOUCH_DOWN, End(), (0, 0), f"stop_{_DOUBLE}", step=3),
-)
+    def lift_off(prefix: str) -> End:
+        return End(State(f"{'' if prefix == 'stop_' else prefix}lift_off", "lift_off"))  # equal steps begin alike
 
-
-def list_sections(steps: int) -> tuple[MotionSection, ...]:
-    """Return the phases of a walk of so many steps, whose inner ones are the same cycle; two half steps have none."""
-    inner = [section._replace(step=2, occurs=steps - HALF_STEPS) for section in CYCLE]
-    return (*START, *(inner if steps > HALF_STEPS else ()), *STOP)
+    side = (swings[0][0],) * 2
+    shift = MotionSection("shift", Support.STAND, End(), lift_off(steps[1][0]), side, SHIFT)
+    sections = [shift._replace(name=STAND, end=End(), occurs=0), shift]
+    for number, (k, (prefix, occurs)) in enumerate(steps.items(), 1):
+        (lifted, landed), last = swings[k - 1], k == count
+        single, double, lift = (f"{prefix}{name}" for name in (*TIMES.values(), LIFT))
+        touch_down = End(State(f"{prefix}touch_down", "touch_down"))
+        after = End() if last else lift_off("" if equal else f"step{k + 1}_")._replace(mirrored=True)
+        kind = Support.STAND if np.allclose(landed, side[0], atol=BESIDE) else Support.DOUBLE
+        swing = MotionSection(
+            f"{prefix}ssp", Support.SINGLE, lift_off(prefix), touch_down, (lifted, landed), single, lift
+        )
+        stance = MotionSection(f"{prefix}dsp", kind, touch_down, after, (landed, landed), double)
+        sections += [section._replace(step=number, occurs=occurs) for section in (swing, stance)]
+    return sections if equal else [*sections, sections[-1]._replace(name=STAND_AT_END, begin=End(), occurs=0)]
 
 
-def make_phase_variables(body: Body) -> tuple[Variable, ...]:
-    """Return the variables of one phase: states at both ends, height of the swing, duration, places of the right foot."""
+def list_states(sections: Sequence[MotionSection]) -> list[State]:
+    """Return the states between phases, each once, in the order of time."""
+    ends = (end.state for section in sections for end in (section.begin, section.end))
+    return list(dict.fromkeys(state for state in ends if state is not None))
+
+
+def make_phase_variables(body: Body, right: Sequence[str]) -> tuple[Variable, ...]:
+    """Return the variables of one phase: states at both ends, height of the swing, duration, and places of the right foot."""
     *_, single, _, step = make_cycle_variables(body)
     return (
         *make_state_variables(body, "begin", "lift_off"),
         *make_state_variables(body, "end", "touch_down"),
         make_lift_variable(body),
         replace(single, name=DURATION),
-        replace(step, name=RIGHT_FROM),
-        step,
+        *(replace(step, name=name, unit=name.rpartition("_")[2], description="of the right foot") for name in right),
     )
 
 
-def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
-    """Return the variables of the cycle and of both ends of the walk; without inner steps, few of the cycle's remain."""
-    cycle = make_cycle_variables(body)
-    by_name = {variable.name: variable for variable in cycle}
-    inner = {LIFT, *TIMES.values(), *(v.name for v in STATES[1].make_variables(body))}
-    variables = [variable for variable in cycle if steps > HALF_STEPS or variable.name not in inner]
-    for state in STATES[len(SWITCHES) :]:
-        variables += state.make_variables(body)
-    variables += make_pose_variables(body)
-    for section in (*START[1:], *STOP):
-        kind = Support.SINGLE if section.kind is Support.SINGLE else Support.DOUBLE
-        variables.append(
-            replace(by_name[TIMES[kind]], name=section.duration, description=f"duration of the phase {section.name}")
-        )
-        if kind is Support.SINGLE:
-            words = f"{make_lift_variable(body).description}, phase {section.name}"
-            variables.append(replace(make_lift_variable(body), name=section.lift, description=words))
-    return tuple(variables)
+def make_walk_variables(body: Body, sections: Sequence[MotionSection], *, equal: bool) -> tuple[Variable, ...]:
+    """Return the variables of a walk: the pose at both ends, the shift, and states, swing and times of each step.
+
+    The length of equal steps is the last one; other footholds are given, and steps may lead backwards.
+    """
+    *_, step = cycle = make_cycle_variables(body)
+    of_cycle = {variable.name: variable for variable in cycle}
+    shift = replace(of_cycle[TIMES[Support.DOUBLE]], name=SHIFT, description="duration of the phase shift")
+    variables, states = [*make_pose_variables(body), shift], set[State]()
+    for single, double in zip(sections, sections[1:], strict=False):
+        if single.kind is not Support.SINGLE:
+            continue
+        for state in (single.begin.state, single.end.state):
+            if state is not None and state not in states:
+                states.add(state)
+                variables += state.make_variables(body)
+        prefix = single.name.removesuffix(Support.SINGLE)
+        words = f", {prefix.rstrip('_')} of the walk" if prefix else ""
+        for name, like in zip((single.lift, single.duration, double.duration), (LIFT, *TIMES.values()), strict=True):
+            variables.append(replace(of_cycle[like], name=name, description=f"{of_cycle[like].description}{words}"))
+    if equal:
+        return (*variables, step)
+    both_ways = ("hip_x", "hip_vx")
+    return tuple(replace(v, lower=min(v.lower, -v.upper)) if v.name.startswith(both_ways) else v for v in variables)
 
 
 def make_pose_variables(body: Body) -> list[Variable]:
@@ -115,6 +119,12 @@ def make_pose_variables(body: Body) -> list[Variable]:
         for variable in states
         if variable.name.partition(f"_{STAND}_")[0] in free
     ]
+
+
+def find_alike(body: Body, state: State) -> dict[str, str]:
+    """Return the cycle's variable for each of a state's."""
+    cycle = make_state_variables(body, state.switch, state.switch)
+    return {variable.name: like.name for variable, like in zip(state.make_variables(body), cycle, strict=True)}
 
 
 @cache
@@ -153,11 +163,9 @@ class WalkStart:
         return np.asarray(np.clip(np.array(list(x.values())) + noise, lower, upper))
 
 
-def make_walk_start(
-    body: Body, variables: Sequence[Variable], states: Sequence[State], sections: Sequence[MotionSection]
-) -> WalkStart:
-    """Return the start points of a walk of these states and phases."""
-    alike = {name: like for state in states for name, like in state.find_alike(body).items()}
+def make_walk_start(body: Body, variables: Sequence[Variable], sections: Sequence[MotionSection]) -> WalkStart:
+    """Return the start points of a walk of these phases."""
+    alike = {name: like for state in list_states(sections) for name, like in find_alike(body, state).items()}
     for section in sections:
         if section.duration != SHIFT:
             alike[section.duration] = TIMES[Support.SINGLE if section.kind is Support.SINGLE else Support.DOUBLE]
@@ -166,7 +174,7 @@ def make_walk_start(
     return WalkStart(
         variables=[make_usual_bounds(body, variable) for variable in variables],
         alike=alike,
-        pose=State(STAND, "lift_off").find_alike(body) | {SHIFT: TIMES[Support.DOUBLE]},
+        pose=find_alike(body, State(STAND, "lift_off")) | {SHIFT: TIMES[Support.DOUBLE]},
         rise=math.tan(body.slope_rad),
     )
 

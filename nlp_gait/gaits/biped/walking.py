@@ -14,13 +14,12 @@ from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.cycle import CycleObjective, make_cycle_problem, make_walking_cycle
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.footholds import parse_footholds
-from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.impact import Impact
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase_problem import make_goal
 from nlp_gait.gaits.biped.problems import LoadOptions, SampleOptions
 from nlp_gait.gaits.biped.switch import SOFT_LANDING, Switch
-from nlp_gait.gaits.biped.walk import plan_whole_walk
+from nlp_gait.gaits.biped.walk import plan_footstep_walk, plan_straight_walk
 
 Landing = Literal["soft", "inelastic"]
 LANDINGS: Mapping[Landing, Switch] = {"soft": SOFT_LANDING, "inelastic": Impact(name="touch_down")}
@@ -77,7 +76,7 @@ def plan_walk(body: Body, options: WalkOptions, flight: Flight | None = None) ->
     """Return the problem of a whole walk, on a slope, up a flight of stairs or along footholds; raises InputError."""
     body, grid = body.tilt_ground(options.slope_deg), options.make_grid()
     if not options.footholds:
-        return plan_whole_walk(body, options.steps, grid, flight)
+        return plan_straight_walk(body, options.steps, grid, flight)
     if options.slope_deg or flight:
         raise InputError("footholds are on a level floor; leave out slope_deg and the sizes of stairs")
     places = parse_footholds(options.footholds)
