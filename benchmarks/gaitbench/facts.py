@@ -28,7 +28,6 @@ from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.best_known import SAME, make_probes, make_strictly_feasible
 from nlp_gait.gaitbench.facts import Evidence, Facts
 from nlp_gait.gaitbench.instance import Instance
-from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.proofs.certificate import load_certificates
 
 FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "facts.json"
@@ -56,7 +55,6 @@ THOROUGH = Effort(
 )
 QUICK = Effort(starts=((12, 6), (22, 2), (300, 1)), cma_runs=1, cma_evaluations=5_000, cma_most_variables=12)
 SHARES, TIMED = 100_000, 20_000
-PROOF_TOLERANCE = 1e-3
 
 
 class NothingFound(Exception):
@@ -70,7 +68,6 @@ def main() -> None:
     parser.add_argument("--instance", action="append", help="only this one; repeatable")
     parser.add_argument("--again", action="store_true", help="also instances with stored facts; their probes stay")
     parser.add_argument("--quick", action="store_true", help="a first pass: few starts, one short run of CMA-ES")
-    parser.add_argument("--prove-s", type=float, default=0.0, help="time for a proof where one is possible; 0 for none")
     arguments = parser.parse_args()
     for id in arguments.instance or gaitbench.list_instances(arguments.subset):
         kept = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
@@ -78,7 +75,7 @@ def main() -> None:
         started = time.perf_counter()
         try:
             if published is None or arguments.again:
-                found = find_facts(id, QUICK if arguments.quick else THOROUGH, arguments.prove_s, published)
+                found = find_facts(id, QUICK if arguments.quick else THOROUGH, published)
             else:
                 gap = find_proven_gap(id, published.best_known)
                 if gap in (None, published.evidence.proven_gap):
@@ -93,7 +90,7 @@ def main() -> None:
         print(f"{id}: {kept[id]['best_known']:.10g}, {evidence} ({time.perf_counter() - started:.0f} s)", flush=True)
 
 
-def find_facts(id: str, effort: Effort, prove_s: float, published: Facts | None) -> Facts:
+def find_facts(id: str, effort: Effort, published: Facts | None) -> Facts:
     """Compute the facts about an instance; a better published point is kept, and so are the probes."""
     instance = gaitbench.load(id)
     problem, n = instance.gait_problem, len(instance.names)
@@ -118,8 +115,6 @@ def find_facts(id: str, effort: Effort, prove_s: float, published: Facts | None)
     if published is not None and published.best_known < best_known:
         best, best_known = np.array(published.best_x), published.best_known
     proven = find_proven_gap(id, best_known)
-    if proven is None:
-        proven = prove_gap(instance, best, prove_s)
     if proven is None and published is not None:
         proven = published.evidence.proven_gap
     agreeing = sum(relative(outcome.cost, best_known) <= SAME for outcome in ends)
@@ -172,14 +167,6 @@ def find_proven_gap(id: str, best_known: float) -> float | None:
     """Return how much better than the best known any feasible point can be, by the shipped certificates; None without one."""
     file = load_certificates().get(id)
     return None if file is None else (best_known - file.certificate.bound) / abs(best_known)
-
-
-def prove_gap(instance: Instance, best: Array, limit_s: float) -> float | None:
-    """Return how much better than the best known any feasible point can be, by branch and bound; None without a bound."""
-    if len(instance.names) > 4 or not limit_s:
-        return None
-    found = certify(instance.gait_problem, best, tolerance=PROOF_TOLERANCE, time_limit_s=limit_s)
-    return found.gap if math.isfinite(found.bound) else None
 
 
 def evaluation_us(instance: Instance, X: Array) -> float:

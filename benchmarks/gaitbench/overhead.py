@@ -1,11 +1,10 @@
 """What the adapter to pymoo costs: its GA on an instance against the same GA on a Problem written by hand.
 
-``python -m benchmarks.gaitbench.overhead``; both problems call the same compiled kernel, and both runs end at the same point.
+``python -m benchmarks adapter``; both problems call the same compiled kernel, and both runs end at the same point.
 """
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from pymoo.algorithms.soo.nonconvex.ga import GA
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 
-from benchmarks.rows import Row, ratio, side_by_side, table
+from benchmarks.rows import Row, ratio, side_by_side
 from nlp_gait import gaitbench
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
 
@@ -55,11 +54,3 @@ def adapter(rounds: int, id: str = "ssp-v5") -> list[Row]:
             note=f"{POPULATION} x {GENERATIONS}, the same end",
         )
     ]
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.gaitbench.overhead", description=__doc__.splitlines()[0]
-    )
-    parser.add_argument("--rounds", type=int, default=15)
-    print(table(adapter(parser.parse_args().rounds)))

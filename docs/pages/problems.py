@@ -42,7 +42,6 @@ SIZES_INTRODUCTION = """## Sizes of the NLPs
 What NLP solvers receive with default options: scaled variables and those of lifted operations, the lower triangle of the Hessian;
 measured by `python -m docs.nlp_sizes`. `nlp-gait export PROBLEM --to solver --out DIR` writes one as
 C++ [for control engineers](../../control-engineer.md#the-nlp)."""
-CATALOGUE = Path(__file__).parents[1] / "gaitbench.json"
 INSTANCES = """## Instances of GaitBench
 
 An asterisk marks those of the subset `small`. *Feasible* is the share of 100,000 uniform points, *cost* the processor time of
@@ -100,21 +99,21 @@ def nlp_sizes() -> str:
 
 def list_instances() -> str:
     """Return the table of GaitBench's instances."""
-    header = ("id", "what", "n", "inequalities", "feasible", "cost", "best known", "evidence")
+    header = ("id", "what", "n", "feasible", "cost", "best known", "evidence")
+    facts = load_facts()
     return table(
         header,
         (
             (
-                code(entry["id"]) + " \\*" * ("small" in entry["subsets"]),
-                literal(entry["name"].partition(": ")[2]),
-                str(entry["variables"]["dimension"]),
-                str(entry["constraints"]["inequalities"]),
-                f"{100 * entry['feasible_share']:.2g} %",
-                f"{entry['evaluation_us']:.2g} us",
-                f"{entry['best_known']['objective']:.6g}",
-                literal(entry["best_known"]["evidence"]),
+                code(definition.id) + " \\*" * definition.small,
+                literal(definition.what),
+                str(len(facts[definition.id].best_x)),
+                f"{100 * facts[definition.id].feasible_share:.2g} %",
+                f"{facts[definition.id].evaluation_us:.2g} us",
+                f"{facts[definition.id].best_known:.6g}",
+                literal(str(facts[definition.id].evidence)),
             )
-            for entry in json.loads(CATALOGUE.read_text(encoding="utf-8"))["problems"]
+            for definition in DEFINITIONS
         ),
     )
 

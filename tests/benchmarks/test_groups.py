@@ -45,7 +45,7 @@ def test_a_certificate_is_proven_again(tmp_path):
 @pytest.mark.slow
 def test_facts_and_best_known_values_are_found_again(tmp_path, monkeypatch):
     effort = facts.Effort(starts=((300, 1),), cma_runs=1, cma_evaluations=500, cma_most_variables=12)
-    found = facts.find_facts("walk12-w015", effort, 0.0, None)
+    found = facts.find_facts("walk12-w015", effort, None)
     assert found.best_known == pytest.approx(load_facts()["walk12-w015"].best_known, rel=1e-6)
     shipped = [entry["objective"] for entry in json.loads(best_known.FILE.read_text())]
     monkeypatch.setattr(best_known, "FILE", tmp_path / "best_known.json")

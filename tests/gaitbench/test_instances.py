@@ -1,8 +1,6 @@
 """Every instance is what it was when it was published, and one object serves threads, processes and derivatives."""
 
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +16,6 @@ from nlp_gait.gaitbench.facts import DEFINITIONS, load_facts
 PUBLISHED = 1e-12
 # Central differences with steps of 1e-6 of each range.
 STEP, DIFFERENCES = 1e-6, 1e-5
-CATALOGUE = json.loads((Path(__file__).parents[2] / "docs" / "gaitbench.json").read_text(encoding="utf-8"))["problems"]
 QUICK = ("walk12-w015", "ssp-v5", "ssp-v5-time10")
 # The others' exact functions are interpreted, which takes less time than to compile them; a compiled kernel is itself checked
 # against the interpreted one when it is built.
@@ -153,32 +150,6 @@ def test_evidence_says_what_it_rests_on() -> None:
         assert f"{evidence.agreeing} of {evidence.starts} starts" in text
         assert evidence.agreeing > 1 or "best known" in text or evidence.proven_gap is not None
         assert evidence.cma_gap is None or evidence.cma_gap > -1e-6  # nothing better was found and left out
-
-
-def test_definitions_are_those_that_were_published() -> None:
-    """By the catalogue in the documentation, which was written when they were; nothing is built."""
-    for entry, definition in zip(CATALOGUE, DEFINITIONS, strict=True):
-        assert entry["id"] == definition.id and entry["name"] == f"GaitBench 1: {definition.what}"
-        assert entry["built_from"] == {
-            "problem": definition.problem,
-            "options": dict(definition.options),
-            "parameters": dict(definition.values),
-            "held": dict(definition.held),
-        }
-        assert (entry["difficulty"], entry["reference"]) == (definition.difficulty, definition.source)
-        assert entry["subsets"] == (["small", "full"] if definition.small else ["full"])
-
-
-@pytest.mark.slow
-def test_the_catalogue_in_the_documentation_is_that_of_the_instances() -> None:
-    for entry, id in zip(CATALOGUE, gaitbench.list_instances(), strict=True):
-        instance, variables, best = gaitbench.load(id), entry["variables"], entry["best_known"]
-        assert (variables["names"], variables["units"]) == (list(instance.names), list(instance.units))
-        assert (variables["lower"], variables["upper"]) == (instance.lower.tolist(), instance.upper.tolist())
-        assert entry["constraints"]["inequalities"] == len(instance.row_names)
-        assert (best["objective"], best["x"]) == (instance.best_known, instance.best_x.tolist())
-        assert (best["evidence"], best["proven_gap"]) == (str(instance.evidence), instance.evidence.proven_gap)
-        assert entry["feasible_share"] == instance.facts.feasible_share
 
 
 def test_an_instance_that_has_changed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
