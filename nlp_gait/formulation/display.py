@@ -10,6 +10,7 @@ from nlp_gait.formulation.assembly import NumericPoint
 from nlp_gait.formulation.signals import Array, Columns, Signals, make_vector_columns
 from nlp_gait.robots.robot import Robot
 
+FLAT_AREA = 1e-12  # of a triangle whose corners lie on a line [m^2]
 LEFT, RIGHT, TRUNK = "left", "right", "trunk"
 
 # What the engine needs of a motion in addition to the joints' q, qd and tau. The floor, or its lowest part, is at z = 0.
@@ -134,13 +135,23 @@ class Display:
 
 
 def find_hull(points: Array) -> Array | None:
-    """Return corners (M, 2) of the convex hull of points (N, 2), counter-clockwise; None for points on a line."""
-    from scipy.spatial import ConvexHull, QhullError  # costs 0.1 s to import
+    """Return corners (M, 2) of the convex hull of points (N, 2), counter-clockwise; None for points on a line.
 
-    try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except QhullError:  # soles without width, as in a planar model
-        return None
+    Andrew (1979), Another efficient algorithm for convex hulls in two dimensions: a lower and an upper chain of sorted points.
+    """
+    ordered = sorted(map(tuple, points.tolist()))
+    corners: list[tuple[float, float]] = []
+    for points_of_chain in (ordered, ordered[::-1]):
+        chain: list[tuple[float, float]] = []
+        for x, y in points_of_chain:
+            while len(chain) > 1:
+                (x1, y1), (x2, y2) = chain[-2:]
+                if (x2 - x1) * (y - y1) - (y2 - y1) * (x - x1) > FLAT_AREA:  # a turn to the left
+                    break
+                chain.pop()
+            chain.append((x, y))
+        corners += chain[:-1]
+    return np.array(corners) if len(corners) > 2 else None
 
 
 def make_flat_skeleton(signals: Signals, limbs: Sequence[Limb], soles: Sequence[Sole]) -> Skeleton:
