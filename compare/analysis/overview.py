@@ -73,15 +73,18 @@ def list_user_solvers(comparisons: Sequence[Comparison]) -> list[str]:
     return list(dict.fromkeys(s.name for c in comparisons for s in c.solvers if s.is_user_defined))
 
 
-def tabulate_problems(comparisons: Sequence[Comparison]) -> tuple[str, list[tuple[str, ...]]]:
-    """Return a solver, and a header and rows: median gaps on each problem, marked by the test of this solver against each other.
+def tabulate_problems(
+    comparisons: Sequence[Comparison], subject: str | None = None
+) -> tuple[str, list[tuple[str, ...]]]:
+    """Return a solver, and a header and rows: median gaps on each problem, marked by the test of this solver against others.
 
-    It is the first of the user's solvers, else that with the best mean rank. The last rows count the marks, and give mean ranks.
+    By default it is the first of the user's solvers, else that with the best mean rank. The last rows count the marks, and give
+    mean ranks.
     """
     ranks = rank_over_problems(comparisons).mean_ranks
     by_name, _ = index_solvers(comparisons)
     names = list(dict.fromkeys([*ranks, *(name for solvers in by_name for name in solvers)]))
-    subject = [*list_user_solvers(comparisons), *names][0]
+    subject = subject or [*list_user_solvers(comparisons), *names][0]
     rows = [("problem", *map(name_solver, names))]
     for comparison, solvers in zip(comparisons, by_name, strict=True):
         marks = {name: MARKS[result] for name, result in comparison.compare_with_others(subject).items()}

@@ -45,7 +45,7 @@ class Effect:
     p: float  #: of the rank-sum test stratified by instance, Holm-corrected over the changes
 
     @property
-    def verdict(self) -> str:
+    def result(self) -> str:
         """Invariant, better or worse."""
         if self.p >= SIGNIFICANT:
             return "invariant"
@@ -64,13 +64,13 @@ class Audit:
     evaluations: int  #: of a run on a gait problem
 
     @property
-    def accusations(self) -> tuple[str, ...]:
+    def biases(self) -> tuple[str, ...]:
         """Biases that were found, in words; empty for none."""
         from scipy.stats import binomtest
 
         biases = []
         centre = next(effect for effect in self.effects if effect.change == CENTRE)
-        if centre.verdict == "better" and centre.a12 >= LARGE:
+        if centre.result == "better" and centre.a12 >= LARGE:
             biases.append(
                 f"gains where the optimum is in the middle of the box (A12 {centre.a12:.2f}, p {centre.p:.1g})"
             )

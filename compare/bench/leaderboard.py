@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.analysis.columns import format_count
 from compare.analysis.comparison import Comparison, compare_problems, index_solvers
-from compare.analysis.overview import count_wins
+from compare.analysis.overview import count_wins, explain_marks, tabulate_problems
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
 from compare.bench.baseline import EVALUATIONS, get_reference, load_baseline
 from compare.drawing.comparison_figures import make_ecdf_charts
@@ -16,9 +15,13 @@ from compare.report.document import Document, Section, Table, make_text_table
 from compare.report.provenance import TERMS
 from compare.report.study_sections import make_chart_figure
 from compare.study.record import RunRecord
-from nlp_gait import gaitbench
 
-PER_INSTANCE_TARGET = 1e-3
+HOW = (
+    "Every solver makes {runs} runs on each instance, with {evaluations} evaluations each, run k with the seed k; IPOPT and "
+    "SLSQP begin at a random point and end by themselves, SLSQP within the same budget and both within 60 s. What counts is what the "
+    "exact functions give. The mean rank is that of the expected running time over all instances and the targets {targets} above "
+    "the best known; equals share a rank, and pairs that no solver reached are left out."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,10 +94,11 @@ def make_leaderboard_page(
     count_of = len(board.comparisons)
     runs = sorted({len(solver.records) for comparison in board.comparisons for solver in comparison.solvers})
     targets = ", ".join(f"{100 * target:g} %" for target in TARGETS)
+    subject, (header, *rows) = tabulate_problems(board.comparisons, solver)
     title = f"GaitBench, {suite}: {count_of} instances, {len(board.standings)} solvers"
     return Document(
         title=title if solver is None else f"{solver} on {title}",
-        headline=() if solver is None else make_verdict(board, solver),
+        headline=() if solver is None else describe_place(board, solver),
         parts=(
             _make_standings_table(board),
             make_chart_figure(
@@ -103,23 +107,16 @@ def make_leaderboard_page(
                 "31 targets, from 100 % to 1e-4 % above the best known.",
                 make_ecdf_charts(board.comparisons, per_variable=True),
             ),
-            Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),
+            Section(title="Instance by instance", parts=(explain_marks(subject), make_text_table(header, rows))),
             Section(
                 title="How it was measured",
-                parts=(
-                    f"Every solver makes {' or '.join(map(str, runs))} runs on each instance, with {evaluations} evaluations "
-                    "each, run k with the seed k; IPOPT and SLSQP begin at a random point and end by themselves, SLSQP within "
-                    "the same budget and both within 60 s. What counts is the exact functions' verdict. The mean rank is that of "
-                    f"the expected running time over all instances and the targets {targets} above the best known; equals share "
-                    "a rank, and pairs that no solver reached are left out.",
-                    TERMS,
-                ),
+                parts=(HOW.format(runs=" or ".join(map(str, runs)), evaluations=evaluations, targets=targets), TERMS),
             ),
         ),
     )
 
 
-def make_verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
+def describe_place(board: Leaderboard, solver: str) -> tuple[str, ...]:
     """Return the result of a solver in sentences."""
     place = board.place(solver)
     standing = board.standings[place - 1]
@@ -149,27 +146,3 @@ def _make_standings_table(board: Leaderboard) -> Table:
     return make_text_table(
         header, rows, "Mean rank of the expected running time; instances of which each target was reached"
     )
-
-
-def _make_instances_table(board: Leaderboard, solver: str | None) -> Table:
-    header = ["instance", "variables", "best known", "cheapest solver", "its cost"]
-    if solver is not None:
-        header += ["median gap", "cost", "rank"]
-    rows = [_make_instance_row(comparison, solver) for comparison in board.comparisons]
-    caption = f"Cost: expected evaluations to {100 * PER_INSTANCE_TARGET:g} % above the best known"
-    return make_text_table(header, rows, caption)
-
-
-def _make_instance_row(comparison: Comparison, solver: str | None) -> tuple[str, ...]:
-    instance = gaitbench.load(comparison.problem)
-    costs = {s.name: s.expected_cost(PER_INSTANCE_TARGET) for s in comparison.solvers}
-    cheapest = min(costs, key=lambda name: costs[name])
-    finite = math.isfinite(costs[cheapest])
-    size, best = str(len(instance.names)), f"{comparison.reference:.6g}"
-    row = (comparison.problem, size, best, cheapest if finite else "-", format_count(costs[cheapest]))
-    if solver is None:
-        return row
-    runs = next(s for s in comparison.solvers if s.name == solver)
-    rank = 1 + sum(cost < costs[solver] for cost in costs.values())
-    place = str(rank) if math.isfinite(costs[solver]) else "-"
-    return (*row, comparison.format_gap(comparison.gap(runs.median_cost)), format_count(costs[solver]), place)

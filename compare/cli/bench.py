@@ -8,7 +8,7 @@ from typer import Option
 
 from compare.bench.audit import INSTANCES, audit_search
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, load_table, make_bench_study
-from compare.bench.leaderboard import make_leaderboard_page, make_verdict, rank_solvers
+from compare.bench.leaderboard import describe_place, make_leaderboard_page, rank_solvers
 from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
 from compare.cli.options import Evaluations, Jobs, Scheduler, parse_names
@@ -117,7 +117,7 @@ def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEff
         },
         parts=[
             tabulate(title, enumerate(board.standings, start=1), columns),
-            *(() if name is None else make_verdict(board, name)),
+            *(() if name is None else describe_place(board, name)),
         ],
         written=write_document(out, add_origin(page, describe_command(), problems), "leaderboard"),
     )
@@ -133,17 +133,17 @@ def _audit(algorithm: str | None, folder: Path) -> Output:
     check_run(task)
     with show_progress("audit", len(INSTANCES) + 1) as advance:
         audit = audit_search(task.make_search(), progress=advance)
-    rows = [(e.change, e.verdict, f"{e.a12:.2f}", f"{e.p:.2g}") for e in audit.effects]
-    effects = [{**asdict(effect), "verdict": effect.verdict} for effect in audit.effects]
+    rows = [(e.change, e.result, f"{e.a12:.2f}", f"{e.p:.2g}") for e in audit.effects]
+    effects = [{**asdict(effect), "result": effect.result} for effect in audit.effects]
     title, header = f"{task.title}: gait problems in other places of the box", ("change", "result", "A12", "p")
     noise = (
         f"on noise, {100 * audit.edge:.1f} % of the variables end at a bound (unbiased: 0 %), {100 * audit.middle:.0f} % in "
         "the middle 10 % of their ranges (unbiased: 10 %)"
     )
-    verdict = "; ".join(audit.accusations) or "no bias found"
+    verdict = "; ".join(audit.biases) or "no bias found"
     page = Document(title=title, headline=(f"{task.title}: {verdict}.",), parts=(make_text_table(header, rows), noise))
     return Output(
-        data={**asdict(audit), "effects": effects, "accusations": list(audit.accusations)},
+        data={**asdict(audit), "effects": effects, "biases": list(audit.biases)},
         parts=[Rows(title, header, rows), noise, verdict],
         written=write_document(make_writable_folder(folder), add_origin(page, describe_command(), ()), "audit"),
     )

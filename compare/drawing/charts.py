@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from compare.drawing.figures import Look, assign_looks, format_power_of_ten
-from compare.drawing.shapes import LETTER, LINE, MARKERS, Drawing, Label, Stroke, draw_legend, place_drawings
+from compare.drawing.shapes import CIRCLE, LETTER, LINE, Drawing, Label, Stroke, draw_legend, place_drawings
 from nlp_gait.formulation import Array
 
 if TYPE_CHECKING:
@@ -110,8 +110,7 @@ def _draw_series(series: Series, look: Look, x: ChartAxis, y: ChartAxis, solid: 
         notes = [*series.notes] or [
             f"{series.name}: {b:.4g} at {a:.4g}" for a, b in zip(series.x, series.y, strict=True)
         ]
-        marker = MARKERS[look.marker]
-        marks = [(marker + point, note) for point, note, ok in zip(points, notes, finite, strict=True) if ok]
+        marks = [(CIRCLE + point, note) for point, note, ok in zip(points, notes, finite, strict=True) if ok]
         return [Stroke(lines=[mark], colour=look.colour, opacity=0.8, note=note) for mark, note in marks]
     points = points[finite]
     if series.upper is not None:

@@ -34,7 +34,6 @@ COLOURS = {
     "de": "#56B4E9",
 }
 LINES = ("-", "--", ":", "-.")
-MARKERS = ("o", "s", "^", "D")
 # Ink of axes and text in figures inside a page: replaced by the page's own colour there.
 INK = "#000000"
 LEGS = {"left": "#7A5CC0", "right": "#A07D1C", "trunk": INK}  # unlike those of solvers
@@ -43,11 +42,10 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u207
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
-    """Colour, line and marker of a solver."""
+    """Colour and line of a solver."""
 
     colour: str
     line: str
-    marker: str
 
 
 def assign_looks(names: Collection[str]) -> dict[str, Look]:
@@ -61,9 +59,8 @@ def assign_looks(names: Collection[str]) -> dict[str, Look]:
         # A polished search has its search's colour; an unknown solver gets the least used one.
         usual = COLOURS.get(name.lower()) or COLOURS.get(name.lower().split("+")[0])
         colour = usual or min((c for c in COLOURS.values() if c != INK), key=lambda c: used[c])
-        kind = used[colour]
+        looks[name] = Look(colour=colour, line=LINES[used[colour] % len(LINES)])
         used[colour] += 1
-        looks[name] = Look(colour=colour, line=LINES[kind % len(LINES)], marker=MARKERS[kind % len(MARKERS)])
     return {name: looks[name] for name in names}
 
 

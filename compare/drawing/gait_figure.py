@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from compare.drawing.charts import Chart, Series, draw_chart
-from compare.drawing.figures import assign_looks
-from compare.drawing.poses import draw_poses
-from compare.drawing.shapes import Drawing, place_drawings
+from compare.drawing.charts import HEIGHT, WIDTH, Chart, Series, draw_chart
+from compare.drawing.figures import LEGS, Look, assign_looks
+from compare.drawing.shapes import LINE, Drawing, Label, Stroke, draw_legend, place_drawings
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result, sample_signals
-from nlp_gait.formulation.display import Skeleton
+from nlp_gait.formulation.display import LEFT, RIGHT, Skeleton
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.signals import JOINT_UNITS
 
@@ -22,6 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PERIOD_S = 0.02  # between samples
+GROUND = "#909090"
+MARGIN = 0.04  # [m] around everything that moves
+POSES, FAINTEST = 6, 0.25  # number of poses, and opacity of the first one; the last one has 1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,3 +88,42 @@ def make_gait_charts(gaits: Mapping[str, GaitCurves]) -> list[Chart]:
         series = [Series(name=n, x=gaits[n].t, y=curve) for n, curve in values.items() if curve is not None]
         charts += [Chart(x="time [s]", y=words, series=series, is_time=True)] if series else []
     return charts
+
+
+class View(NamedTuple):
+    """A view from the side."""
+
+    scale: float  #: [pixels/m]
+    corner: Array  #: (2,) place of the origin [pixels]
+
+    def place(self, points: Array) -> Array:
+        """Return the pixels (..., 2) of points (..., 3)."""
+        return self.corner + self.scale * points[..., [0, 2]] * (1.0, -1.0)
+
+
+def draw_poses(first: Skeleton, over: tuple[str, Skeleton, Look] | None = None) -> Drawing:
+    """Draw poses of a gait from the side, later ones darker, some of another gait dashed over it, and a legend below."""
+    low, high = first.box()
+    low[2] = min(low[2], first.ground[:, 1].min() if first.planar else 0.0)
+    ends = np.array([low - MARGIN, high + MARGIN])[:, [0, 2]] * (1.0, -1.0)
+    scale = float(min((WIDTH, HEIGHT - LINE) / np.abs(ends[1] - ends[0])))
+    corner = np.array([WIDTH, HEIGHT - LINE]) / 2.0 - scale * (ends[0] + ends[1]) / 2.0
+
+    view = View(scale, corner)
+    shapes: list[Stroke | Label] = [Stroke(lines=[view.place(np.insert(first.ground, 1, 0.0, axis=1))], colour=GROUND)]
+    chosen = np.unique(np.linspace(0, len(first.t) - 1, POSES).round().astype(int)).tolist()
+    for k, opacity in zip(chosen, np.linspace(FAINTEST, 1.0, len(chosen)).tolist(), strict=True):
+        parts = [(limb.side, limb.points[k], 1.5) for limb in first.limbs]
+        parts += [(sole.side, np.concatenate([sole.corners[k], sole.corners[k, :1]]), 2.4) for sole in first.soles]
+        shapes += [
+            Stroke(lines=[view.place(points)], colour=LEGS[side], width=width, opacity=opacity)
+            for side, points, width in parts
+        ]
+    legend = [("left leg", LEGS[LEFT], ""), ("right leg", LEGS[RIGHT], "")]
+    if over is not None:
+        name, skeleton, look = over
+        lines = [view.place(limb.points[k]) for k in (0, len(skeleton.t) // 2, -1) for limb in skeleton.limbs]
+        shapes.append(Stroke(lines=lines, colour=look.colour, dash="5 3"))
+        legend.append((name, look.colour, "5 3"))
+    shapes += draw_legend(legend, LINE / 2, HEIGHT - LINE, WIDTH)[0]
+    return Drawing(width=WIDTH, height=HEIGHT, shapes=shapes)

@@ -21,34 +21,31 @@ def plot_robot(biped: Biped, path: Path) -> Path:
     robot = biped.full
     with use_style():
         canvas = make_figure(9.0, 4.4)
-        front, aside, above = canvas.subplots(1, 3)
+        views = front, aside, above = canvas.subplots(1, 3)
         for joint in robot.joints.values():
             end = np.sum([ancestor.origin_m for ancestor in robot.path_to_root(joint.child)], axis=0)
-            start = end - np.array(joint.origin_m)
+            ends = np.array([end - np.array(joint.origin_m), end]).T
             side = next((s for s in SIDES if joint.name in biped.legs[s].joints), None)
             look = {"color": LEGS[side] if side else OTHERS, "lw": 2.0 if side else 1.0, "marker": "o", "ms": 2.5}
-            front.plot(*zip(start[1:], end[1:], strict=True), **look)
-            aside.plot(*zip(start[[0, 2]], end[[0, 2]], strict=True), **look)
+            front.plot(*ends[1:], **look)
+            aside.plot(*ends[[0, 2]], **look)
         for side in SIDES:
-            leg, foot = biped.legs[side], robot.feet[side]
-            x, y, z = leg.foot_m
-            z -= foot.ankle_height_m
-            front.plot([y - foot.right_m, y + foot.left_m], [z, z], color=LEGS[side], lw=3.0)
-            aside.plot([x - foot.back_m, x + foot.front_m], [z, z], color=LEGS[side], lw=3.0)
-            corners = [(-foot.back_m, -foot.right_m), (foot.front_m, -foot.right_m), (foot.front_m, foot.left_m)]
-            corners += [(-foot.back_m, foot.left_m), (-foot.back_m, -foot.right_m)]
-            above.plot(*(np.array(corners) + [x, y]).T, color=LEGS[side], label=f"{side} sole")
-            above.plot(x, y, "o", color=LEGS[side], ms=4)
-            above.plot(*leg.hip_m[:2], "x", color=LEGS[side], ms=6)
+            leg, foot, look = biped.legs[side], robot.feet[side], {"color": LEGS[side]}
+            x, y, z = leg.foot_m - np.array([0.0, 0.0, foot.ankle_height_m])
+            across, along = [y - foot.right_m, y + foot.left_m], [x - foot.back_m, x + foot.front_m]
+            front.plot(across, [z, z], lw=3.0, **look)
+            aside.plot(along, [z, z], lw=3.0, **look)
+            above.plot(
+                [along[k] for k in (0, 1, 1, 0, 0)], [across[k] for k in (0, 0, 1, 1, 0)], label=f"{side} sole", **look
+            )
+            above.plot(x, y, "o", ms=4, **look)
+            above.plot(*leg.hip_m[:2], "x", ms=6, **look)
         front.invert_xaxis()  # seen from behind: left is left
-        for axes, across, up in ((front, "y", "z"), (aside, "x", "z"), (above, "x", "y")):
-            axes.set_xlabel(f"{across} [m]")
-            axes.set_ylabel(f"{up} [m]")
+        words = ("from behind", "y", "z"), ("from the right", "x", "z"), ("soles, joints (o) and hips (x)", "x", "y")
+        for axes, (title, x_name, y_name) in zip(views, words, strict=True):
+            axes.set(title=title, xlabel=f"{x_name} [m]", ylabel=f"{y_name} [m]")
             axes.set_aspect("equal", adjustable="datalim")
         above.legend(loc="center")
-        above.set_title("soles, joints (o) and hips (x)")
-        front.set_title("from behind")
-        aside.set_title("from the right")
         canvas.suptitle(robot.name)
         return save_figure(canvas, path)
 
@@ -61,22 +58,19 @@ def plot_simulation(plan: Plan, trace: Simulation, drive: Drive, path: Path) -> 
         figure = make_figure(6.3, 6.0)
         axes = figure.subplots(4, 1, sharex=True)
         smooth, zmp = average_pressure(trace, drive.period_s)[shown], plan.at("zmp", t)
-        for axis, name, k in ((axes[0], "x", 0), (axes[1], "y", 1)):
-            axis.plot(t, trace.pressure[shown, k], color=ENGINE, lw=0.3, alpha=0.6, label="centre of pressure")
-            axis.plot(t, smooth[:, k], color=LEGS["left"], label=f"mean over {1000 * drive.period_s:g} ms")
-            axis.plot(t, zmp[:, k], color=MODEL, label="planned ZMP")
-            axis.set_ylabel(f"{name} [m]")
-        axes[0].legend(loc="best", ncols=3)
+        for k in (0, 1):
+            axes[k].plot(t, trace.pressure[shown, k], color=ENGINE, lw=0.3, alpha=0.6, label="centre of pressure")
+            axes[k].plot(t, smooth[:, k], color=LEGS["left"], label=f"mean over {1000 * drive.period_s:g} ms")
+            axes[k].plot(t, zmp[:, k], color=MODEL, label="planned ZMP")
         axes[2].plot(t, np.abs(trace.torque * trace.qd).sum(axis=1)[shown], color=ENGINE, lw=0.5, label="engine")
-        power = np.abs(planned["tau"] * planned["qd"]).sum(axis=1)
-        axes[2].plot(planned["t"], power, color=MODEL, label="model")
-        axes[2].set_ylabel("mechanical\npower [W]")
-        axes[2].legend(loc="best", ncols=2)
+        axes[2].plot(planned["t"], np.abs(planned["tau"] * planned["qd"]).sum(axis=1), color=MODEL, label="model")
         for i, side in enumerate(SIDES):
             axes[3].plot(t, trace.loads[shown, i], color=LEGS[side], lw=0.5, label=f"{side} foot")
-        axes[3].set_ylabel("load [N]")
-        axes[3].set_xlabel("time [s]")
-        axes[3].legend(loc="best", ncols=2)
-        for axis in axes:
+        labels = ("x [m]", "y [m]", "mechanical\npower [W]", "load [N]")
+        for k, (axis, label) in enumerate(zip(axes, labels, strict=True)):
+            axis.set_ylabel(label)
             axis.axvline(plan.duration_s, color="#a0a0a0", lw=0.8)
+            if k != 1:
+                axis.legend(loc="best", ncols=3)
+        axes[3].set_xlabel("time [s]")
     return save_figure(figure, path)

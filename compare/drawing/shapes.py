@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 LETTER, LINE, FONT = 6.2, 18, 12  # width of a letter, height of a line of text, and of its letters [pixels]
 PIXELS_PER_INCH = 108
 POINTS = 72 / PIXELS_PER_INCH  # of a pixel
+CIRCLE = 3.0 * np.exp(2j * np.pi / 12 * np.arange(13)).view(float).reshape(-1, 2)  # a marker about zero
 ALIGNED = {"start": "left", "middle": "center", "end": "right"}
 
 
@@ -128,21 +129,6 @@ def place_drawings(drawings: Sequence[Drawing], columns: int = 2) -> Drawing:
         for shape in drawing.shapes
     ]
     return Drawing(width=width * columns, height=height * -(-len(drawings) // columns), shapes=shapes)
-
-
-def make_marker(corners: int, radius: float, turn: float) -> Array:
-    """Return a regular polygon (corners + 1, 2) about zero, its first corner at an angle."""
-    angles = turn + 2.0 * np.pi / corners * np.arange(corners + 1)
-    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
-
-
-# By the marker of a look.
-MARKERS = {
-    "o": make_marker(12, 3.0, 0.0),
-    "s": make_marker(4, 4.2, np.pi / 4.0),
-    "^": make_marker(3, 3.8, -np.pi / 2.0),
-    "D": make_marker(4, 3.6, 0.0),
-}
 
 
 def draw_legend(

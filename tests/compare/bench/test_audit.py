@@ -67,26 +67,26 @@ def run(search: Any, runs: int = 6, evaluations: int = 400) -> Audit:
 @pytest.mark.parametrize("base", ["pso"])
 def test_a_search_that_drifts_to_the_middle_is_found(base: str) -> None:
     found = run(Planted(make_algorithm(base), "middle"), 12, 800)
-    assert "in the middle of the box" in found.accusations[0]
+    assert "in the middle of the box" in found.biases[0]
     centre = next(effect for effect in found.effects if effect.change == CENTRE)
-    assert (centre.verdict, centre.a12 > 0.64) == ("better", True)
+    assert (centre.result, centre.a12 > 0.64) == ("better", True)
 
 
 @pytest.mark.parametrize("base", ["pso"])
 def test_a_search_that_clips_to_bounds_is_found(base: str) -> None:
-    (accusation,) = run(Planted(make_algorithm(base), "bound")).accusations
+    (accusation,) = run(Planted(make_algorithm(base), "bound")).biases
     assert accusation.startswith("clips: on noise, ")
 
 
 @pytest.mark.parametrize("name", ["random", "pso", "lshade"])
 def test_an_unbiased_search_is_not_accused(name: str) -> None:
-    assert run(make_algorithm(name)).accusations == ()
+    assert run(make_algorithm(name)).biases == ()
 
 
 @pytest.mark.slow
 def test_cma_es_is_not_accused() -> None:
     pytest.importorskip("cma")
-    assert run(make_algorithm("cma"), 3, 300).accusations == ()
+    assert run(make_algorithm("cma"), 3, 300).biases == ()
 
 
 def test_every_change_keeps_the_problem() -> None:
@@ -155,11 +155,11 @@ def test_biases_follow_from_the_measured_shares(
 ) -> None:
     effects = tuple(Effect(change=c, a12=a12 if c == CENTRE else 0.9, p=p) for c in CHANGES)
     audit = Audit(algorithm="mine", effects=effects, edge=edge, middle=middle, runs=100, evaluations=1000)
-    assert len(audit.accusations) == len(words)
-    assert all(word in sentence for word, sentence in zip(words, audit.accusations, strict=True))
+    assert len(audit.biases) == len(words)
+    assert all(word in sentence for word, sentence in zip(words, audit.biases, strict=True))
 
 
 def test_verdicts_follow_from_effect_and_test() -> None:
-    assert Effect(change="mirrored", a12=0.9, p=0.2).verdict == "invariant"
-    assert Effect(change="mirrored", a12=0.9, p=0.001).verdict == "better"
-    assert Effect(change="mirrored", a12=0.1, p=0.001).verdict == "worse"
+    assert Effect(change="mirrored", a12=0.9, p=0.2).result == "invariant"
+    assert Effect(change="mirrored", a12=0.9, p=0.001).result == "better"
+    assert Effect(change="mirrored", a12=0.1, p=0.001).result == "worse"
