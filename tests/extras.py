@@ -10,10 +10,8 @@ from docs.browser import BROWSER
 EXTRAS = {
     "distributed": "cluster",
     "ioh": "algorithms",
-    "iohinspector": "dev",
     "latex2mathml": "docs",
     "nbclient": "docs",
-    "optuna": "algorithms",
     "playwright": "browser",
     "pygmo": "algorithms",
     "sphinx_gallery": "docs",

@@ -41,7 +41,6 @@ LAYERS = (
     "compare.rounding",
     "compare.study",
     "compare.analysis",
-    "compare.logs",
     "compare.drawing",
     "compare.report",
     "compare.bench",

@@ -8,7 +8,7 @@ from functools import cache
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand
 from typer.main import get_command
 
 from nlp_gait.providers import import_object
@@ -40,18 +40,6 @@ PANELS = {
         "export": ("export:export", "Write a gait, an instance or a problem for others."),
     },
 }
-# What serves instead of removed commands.
-REPLACEMENTS = {
-    "animate": "export --to html plays a gait",
-    "archive": "verify FOLDER --pack FILE.zip packs a study",
-    "capabilities": "sweep --over speed_m_s=LOW:HIGH:COUNT names what stops the robot",
-    "cite": "list --cite [NAME] prints BibTeX",
-    "export-objective": "export --to objective writes it",
-    "export-solver": "export --to solver writes it",
-    "logs": "report FOLDER --logs writes the runs as logs for iohinspector",
-    "search": "compare PROBLEM --algorithms pso --starts 0 --runs 1 runs a search",
-    "walk": "sweep --engine simulates the cheapest cycle at each speed",
-}
 
 
 @cache
@@ -80,20 +68,7 @@ class ImportedWhenUsed(TyperCommand):
         return load_command(str(self.name)).make_context(info_name, args, parent, **extra)
 
 
-class Commands(TyperGroup):
-    """Commands, without removed ones."""
-
-    def resolve_command(self, context: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
-        """Return name, command and arguments."""
-        if args[0] in REPLACEMENTS:
-            from compare.cli.printing import fail
-
-            fail(f"{args[0]} was removed: {REPLACEMENTS[args[0]]}", status=2)
-        return super().resolve_command(context, args)
-
-
 app = typer.Typer(
-    cls=Commands,
     help="Biped gait problems: the true optimum by IPOPT, and how far evolutionary search stops from it.",
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},

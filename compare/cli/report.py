@@ -5,12 +5,9 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from compare.analysis.comparison import compare_problems
-from compare.analysis.headline import describe_unknown
 from compare.cli.command import OUTPUT, command, describe_stored
 from compare.cli.options import Code, Scheduler, name_all
 from compare.cli.printing import Output, describe_command, say, show_progress
-from compare.logs import write_ioh
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.papers.paper_runs import Runner
 from compare.report import FurtherFiles, renew_report, watch_report
@@ -22,7 +19,6 @@ LATEX = "Also write tables for papers: of each problem, and of all problems and 
 DIGITS = "Decimals of objectives in these tables (default: as many as different medians need to differ)."
 FIGURES = "Also write all figures as PNG, and for papers as PDF, one column wide, with captions in LaTeX."
 WATCH = "Rewrite the report while the study runs; the open page reloads itself."
-LOGS = "Also write the runs as logs for iohinspector, into the folder logs."
 OUT = "Folder for the report, its tables and figures; results stored in it are used again."
 QUICK = "The least work that fills every table and figure, instead of the paper's."
 EFFORT = "JSON file with other settings, as `settings` of `summary.json`; the rest are the paper's."
@@ -35,7 +31,6 @@ def report(
     latex: Annotated[bool, Option("--latex", help=LATEX)] = False,
     digits: Annotated[int | None, Option(min=0, max=15, help=DIGITS)] = None,
     figures: Annotated[bool, Option("--figures", help=FIGURES)] = False,
-    logs: Annotated[bool, Option("--logs", help=LOGS)] = False,
     code: Code = None,
     csv: Annotated[bool, Option("--csv", help=CSV)] = False,
     watch: Annotated[bool, Option("--watch", help=WATCH)] = False,
@@ -54,13 +49,7 @@ def report(
         say(f"open {folder / 'report.html'}; it follows the study in {folder} until Ctrl-C")
         watch_report(folder, lambda: renew_report(folder))
     further = FurtherFiles(csv=csv, latex=latex or digits is not None, decimals=digits, figures=figures)
-    records, damaged, written = renew_report(folder, further)
-    if logs:
-        comparisons = compare_problems(records)
-        for sentence in (s for comparison in comparisons for s in describe_unknown(comparison)):
-            say(f"not in the logs: {sentence}")
-        write_ioh(comparisons, folder / "logs")
-        written.append(folder / "logs")
+    _, damaged, written = renew_report(folder, further)
     return Output(data={"damaged": damaged}, written=written, failures=damaged)
 
 

@@ -49,7 +49,6 @@ DOORS = {
     "compare.report.document": ("Document", "Figure", "Prose", "Section", "Table", "make_text_table"),
     "compare.report.writing": ("render_markdown", "write_document"),
     "compare.archive": (),
-    "compare.logs": (),
 }
 ORDER = ("function", "class", "exception", "data")  # on a page; within each as the module lists them
 CODE = re.compile(r"(``.+?``)")

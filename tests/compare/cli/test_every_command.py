@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.cli import PANELS, REPLACEMENTS, load_command
+from compare.cli import PANELS, load_command
 from tests.compare.cli.calls import is_one_sentence, nlp_gait, one_sentence, process
 from tests.compare.records import DSP_X
 
@@ -105,11 +105,6 @@ def test_options_of_a_problem_are_the_same_in_all_commands(name: str) -> None:
 def test_an_unknown_option_is_named_and_a_refusal_is_below(name: str) -> None:
     assert "--no-such-option" in nlp_gait(name, "--no-such-option", status=2).stderr
     assert any(line.split()[0] == name for line in REFUSED)
-
-
-@pytest.mark.parametrize("name", REPLACEMENTS)
-def test_a_removed_name_is_answered_by_its_replacement(name: str) -> None:
-    assert name not in COMMANDS and REPLACEMENTS[name] in one_sentence(name, status=2)
 
 
 @pytest.mark.parametrize("line", REFUSED)
