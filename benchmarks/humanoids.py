@@ -4,6 +4,8 @@
     python -m benchmarks.humanoids FOLDER --table walks | python -m docs.pages.numbers zoo-walks
     python -m benchmarks.humanoids FOLDER --table others | python -m docs.pages.numbers zoo-others
     python -m benchmarks.humanoids FOLDER FOLDER... --table margins | python -m docs.pages.numbers margins
+    python -m benchmarks.humanoids FOLDER --robots FILE,... --distance 1    # files that you have
+    python -m benchmarks.humanoids FOLDER --table files | python -m docs.pages.numbers public-files
 
 The last table takes a folder for each choice of margins. ``mujoco-menagerie`` downloads its robots,
 or reads a copy below ``MENAGERIE_ROOT``.
@@ -100,10 +102,12 @@ def list_names() -> list[str]:
 
 
 def plan(name: str, folder: Path, row: Row) -> Row:
-    """Plan ten steps at the cheapest speed; returns numbers, or why there is no plan."""
-    begin = perf_counter()
+    """Plan ten steps, or a distance, at the cheapest speed; returns numbers, or why there is no plan."""
+    begin, steps = perf_counter(), STEPS if row.get("distance_m") is None else None
     try:
-        walk = nlp_gait.plan_walk(name, STEPS, settings=WalkSettings(margins=row["margins"]))
+        walk = nlp_gait.plan_walk(
+            name, steps, distance_m=row.get("distance_m"), settings=WalkSettings(margins=row["margins"])
+        )
     except GaitError as error:
         reason = "not run" if "does not provide" in str(error) or "not installed" in str(error) else "refused"
         return {reason: str(error)}
@@ -139,7 +143,12 @@ def walk(name: str, folder: Path, row: Row) -> Row:
         trace = simulate_plan(plan, drive=drive)
         measured = measure_walk(plan, trace, drive, STEPS)
         share = None if measured.walked_m is None else measured.walked_m / row["plan"]["distance_m"]
-        walked[feedback] = {"walked": share, "fell_at_s": trace.fell_at_s}
+        walked[feedback] = {
+            "walked": share,
+            "fell_at_s": trace.fell_at_s,
+            "model_J_per_m": measured.model_J_per_m,
+            "engine_J_per_m": measured.engine_J_per_planned_m,
+        }
     return walked
 
 
@@ -176,12 +185,13 @@ def list_swings(plan: Plan) -> list[tuple[float, float]]:
 STAGES: Mapping[str, Callable[[str, Path, Row], Row]] = {"plan": plan, "walk": walk, "push": push}
 
 
-def run(names: list[str], folder: Path, margins: list[float]) -> None:
+def run(names: list[str], folder: Path, margins: list[float], distance_m: float | None = None) -> None:
     """Run the stages that a robot's file lacks, one robot after another."""
     (folder / "plans").mkdir(parents=True, exist_ok=True)
     for name in names:
         file = folder / find_plan(folder, name).name
-        row: Row = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {"name": name, "margins": margins}
+        row: Row = {"name": name, "margins": margins, "distance_m": distance_m}
+        row = json.loads(file.read_text(encoding="utf-8")) if file.exists() else row
         for stage, compute in STAGES.items():
             if stage not in row and (stage == "plan" or "energy_J_per_m" in row["plan"]):
                 row[stage] = compute(name, folder, row)
@@ -272,15 +282,40 @@ def tabulate_others(folders: list[Path]) -> Iterator[str]:
             yield cells(f"`{row['name']}`", f"not run ({why})")
 
 
+def tabulate_files(folders: list[Path]) -> Iterator[str]:
+    """Tabulate the files of a folder that are in no package: energy by the model and in both simulations."""
+    yield header("file", "mass, kg", "model, J/m", "in open loop, J/m", "with `balance`, J/m")
+    known = set(list_names())
+    rows = [json.loads(file.read_text(encoding="utf-8")) for file in sorted(folders[0].glob("*.json"))]
+    for row in (row for row in rows if row["name"] not in known):
+        plan = row.get("plan", {"not run": "time"})
+        if "energy_J_per_m" in plan:
+            energies = [
+                describe_energy(row["walk"][feedback]) if "walk" in row else "not run" for feedback in FEEDBACKS
+            ]
+            yield cells(f"`{row['name']}`", f"{plan['mass_kg']:.1f}", f"{plan['energy_J_per_m']:.3g}", *energies)
+        else:
+            why = shorten(plan["refused"]) if "refused" in plan else plan.get("infeasible", ["not run (time)"])[0]
+            mass = f"{plan['mass_kg']:.1f}" if "mass_kg" in plan else ""
+            yield cells(f"`{row['name']}`", mass, why, "", "")
+
+
+def describe_energy(walked: Row) -> str:
+    """Return the energy in the engine per planned metre, or when the robot falls."""
+    if walked["fell_at_s"] is not None:
+        return f"falls at {walked['fell_at_s']:.1f} s"
+    return f"{walked['engine_J_per_m']:.3g}"
+
+
 def shorten(message: str) -> str:
     """Return the sentence of an error that names the fault, without the robot's name and the remedy."""
     fault = re.sub(r"^robot (file )?'[^']*': ", "", message)
     if pair := re.search(r"the lowest pair, .*?(?=; if other)|no links are mirror images", fault):
         return pair[0]
-    return re.split(r"\. [A-Z]|; (?:correct|else|a rigid body)", fault)[0]
+    return re.split(r"\. [A-Z]|; (?:correct|else|put it there|add its motor|a rigid body)|: none of its", fault)[0]
 
 
-TABLES = {"walks": tabulate_walks, "others": tabulate_others, "margins": tabulate_margins}
+TABLES = {"files": tabulate_files, "walks": tabulate_walks, "others": tabulate_others, "margins": tabulate_margins}
 
 
 def main() -> None:
@@ -289,13 +324,14 @@ def main() -> None:
     parser.add_argument("folders", type=Path, nargs="+", metavar="FOLDER")
     parser.add_argument("--margins", default=",".join(map(str, MARGINS)), help="as of nlp-gait plan")
     parser.add_argument("--robots", default="", help="names, separated by commas; all by default")
+    parser.add_argument("--distance", type=float, help="that the robots walk [m], instead of ten steps")
     parser.add_argument("--table", choices=TABLES, help="print this table of what has finished")
     arguments = parser.parse_args()
     if arguments.table is not None:
         print("\n".join(TABLES[arguments.table](arguments.folders)))
         return
     names = list(filter(None, arguments.robots.split(","))) or list_names()
-    run(names, arguments.folders[0], [float(share) for share in arguments.margins.split(",")])
+    run(names, arguments.folders[0], [float(share) for share in arguments.margins.split(",")], arguments.distance)
 
 
 if __name__ == "__main__":

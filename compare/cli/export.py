@@ -21,7 +21,7 @@ from nlp_gait.gaitbench.c_export import export_objective
 
 SOURCE = "A gait from `solve --out` or `plan --out`; for objective and solver a problem or an instance of GaitBench."
 KIND = (
-    "Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, ros, html. Of a problem: objective (C++) or "
+    "Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, npz, ros, html. Of a problem: objective (C++) or "
     "solver (NLP with derivatives in C++)."
 )
 OUT = "File, by default next to the result; for objective and solver a folder."

@@ -12,13 +12,16 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import format_csv, replace_file, write_json, write_text
 from nlp_gait.formulation import Array, Result, Signals, sample_at_period, sample_signals
 from nlp_gait.formulation.result import SCHEMA
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import make_plan_model
+from nlp_gait.simulation.engine import load_mujoco
+from nlp_gait.simulation.mjcf import add_bodies, make_plan_model
 from nlp_gait.simulation.plan import make_plan
 
 PERIOD_MS = 40  # as in Gupta, Pratihar, Deb (2023), and Webots' worlds for NAO
 APPROACH_S = 2.0  # from the robot's current pose to the first one: a key of NAOqi needs a time > 0
 LONGEST_LINE = 4095  # characters with the line's end: size of the buffer of Webots' parser
+ROUNDING = 1e-9  # of a duration in periods
 COUPLED = "RHipYawPitch"  # both hip yaw-pitch joints are one motor, which NAOqi commands by the left one's name
 # Usual suffix of a file by format.
 FORMATS = {
@@ -29,6 +32,7 @@ FORMATS = {
     "mujoco-keyframes": ".keyframes.xml",
     "naoqi": ".naoqi.json",
     "ros": ".trajectory.json",
+    "npz": ".npz",
 }
 
 
@@ -52,6 +56,8 @@ def write_as(name: str, path: Path, result: Result, period_ms: int = PERIOD_MS) 
         write_json(path, to_naoqi(signals, result.problem.name))
     elif name == "mujoco-keyframes":
         write_text(path, format_keyframes(result, signals.arrays["t"]))
+    elif name == "npz":
+        write_reference(path, result, period_ms / 1000.0)
     elif name == "csv":
         write_signals_csv(path, signals)
     elif name == "ros":
@@ -120,6 +126,62 @@ def format_keyframes(result: Result, times: Array) -> str:
         Xml.SubElement(keys, "key", {"name": f"{t:.6g} s", "time": repr(t), **texts})
     Xml.indent(root)
     return Xml.tostring(root, encoding="unicode") + "\n"
+
+
+def write_reference(path: Path, result: Result, period_s: float) -> None:
+    """Write a gait as a reference for motion tracking: the arrays of motion files of mjlab and Isaac Lab, and names.
+
+    All joints and bodies of the robot are in MuJoCo's order, depth first: ``joint_pos`` (T, J) [rad], ``joint_vel`` (T, J),
+    ``body_pos_w`` (T, B, 3) [m], ``body_quat_w`` (T, B, 4) as w, x, y, z, ``body_lin_vel_w`` and ``body_ang_vel_w`` (T, B, 3),
+    ``fps``, ``joint_names`` and ``body_names``; body frames are at the joints, with the root's axes at zero angles. Joints that
+    do not move have the angles of the posture. Raises InputError for a robot that moves in a plane, OutputError.
+    """
+    plan, engine = make_plan(result), load_mujoco()
+    if plan.planar:
+        raise InputError(f"the robot of {result.problem.name!r} moves in a plane, and references are in space")
+    robot = plan.full_robot
+    times: Array = np.arange(int(plan.duration_s / period_s + ROUNDING) + 1) * np.float64(period_s)
+    root, world = Xml.fromstring('<mujoco><compiler angle="radian"/></mujoco>'), Xml.Element("worldbody")
+    root.append(world)
+    add_bodies(world, make_tree(robot, robot.root), {}, root="free")
+    model = engine.MjModel.from_xml_string(Xml.tostring(root, encoding="unicode"))
+    joints, bodies = (
+        [item(i).name for i in range(1, n)] for item, n in ((model.joint, model.njnt), (model.body, model.nbody))
+    )
+    driven = [joints.index(name) for name in plan.joints]
+    poses, rates = np.zeros((len(times), model.nq)), np.zeros((len(times), model.nv))
+    poses[:, :7] = np.hstack([plan.at("hip", times), plan.attitude(times)])
+    poses[:, 7:][:, driven] = plan.at("q", times)
+    for k, rate in enumerate(rates):  # the turning of the root by differences, all others as planned
+        before, after = max(k - 1, 0), min(k + 1, len(times) - 1)
+        engine.mj_differentiatePos(model, rate, max(after - before, 1) * period_s, poses[before], poses[after])
+    rates[:, :3], rates[:, 6:][:, driven] = plan.rate("hip", times), plan.rate("q", times)
+    places, turns, motions = ([] for _ in range(3))
+    data, motion = engine.MjData(model), np.zeros(6)
+    for data.qpos[:], data.qvel[:] in zip(poses, rates, strict=True):
+        engine.mj_fwdPosition(model, data)
+        engine.mj_fwdVelocity(model, data)
+        places.append(data.xpos[1:].copy())
+        turns.append(data.xquat[1:].copy())
+        for body in range(1, model.nbody):
+            engine.mj_objectVelocity(model, data, engine.mjtObj.mjOBJ_XBODY, body, motion, 0)
+            motions.append(motion.copy())
+    moved = np.reshape(motions, (len(times), len(bodies), 6))
+    held = [0.0 if name in plan.joints else robot.posture_rad.get(name, 0.0) for name in joints]
+    with replace_file(path) as temporary, open(temporary, "wb") as file:
+        np.savez(
+            file,
+            allow_pickle=False,
+            joint_pos=poses[:, 7:] + held,
+            joint_vel=rates[:, 6:],
+            body_pos_w=np.array(places),
+            body_quat_w=np.array(turns),
+            body_lin_vel_w=moved[:, :, 3:],
+            body_ang_vel_w=moved[:, :, :3],
+            fps=np.array(1.0 / period_s),
+            joint_names=np.array(joints),
+            body_names=np.array(bodies),
+        )
 
 
 def write_signals_csv(path: Path, signals: Signals) -> None:

@@ -125,7 +125,7 @@ def make_biped_model(robot: Robot) -> Biped:
     nominal = NOMINAL_TORQUE * robot.mass_kg * GRAVITY * legs["left"].length_m
     joints = {name: replace(joint, nominal_torque_Nm=nominal) for name, joint in model.joints.items()}
     return Biped(
-        full=replace(full, notes=tuple(notes)),
+        full=replace(full, posture_rad=held, notes=tuple(notes)),
         model=replace(model, joints=joints),
         legs=legs,
         posture_rad=held,

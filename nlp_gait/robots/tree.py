@@ -267,27 +267,10 @@ def find_partner(name: str) -> str:
 
 
 def find_partners(robot: Robot) -> Mapping[str, str]:
-    """Return the mirror image of every joint: of the legs by order, of others by place, because names mislead; else by name."""
-    places = {
-        name: np.sum([above.origin_m for above in robot.path_to_root(joint.child)], axis=0)
-        for name, joint in robot.joints.items()
-    }
-    axes = {name: np.array(joint.axis) for name, joint in robot.joints.items()}
-
-    def image(name: str) -> str:
-        named, mirrored = find_partner(name), MIRROR * places[name]
-        fitting = [
-            other
-            for other, place in places.items()
-            if math.dist(mirrored, place) <= MIRROR_M and abs(MIRROR * axes[name] @ axes[other]) >= MIRROR_COSINE
-        ]
-        if named in fitting or not fitting:
-            return named if named in places else name
-        return fitting[0]
-
+    """Return the mirror image of every joint: of the legs by their order from the foot, because names mislead, else by name."""
     left, right = ([joint.name for joint in robot.path_to_root(robot.feet[side].link)] for side in ("left", "right"))
-    legs = dict([*zip(left, right, strict=False), *zip(right, left, strict=False)])
-    return {name: legs[name] if name in legs else image(name) for name in places}
+    images = {name: image if (image := find_partner(name)) in robot.joints else name for name in robot.joints}
+    return {**images, **dict(zip(left, right, strict=False)), **dict(zip(right, left, strict=False))}
 
 
 MIRROR = np.array([1.0, -1.0, 1.0])  # in the plane y = 0

@@ -11,6 +11,9 @@ from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.export.formats import write_as
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.result import sample_at_period
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.mjcf import make_plan_model
+from nlp_gait.simulation.plan import make_plan
 
 DSP = (0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, 2)
 
@@ -90,6 +93,29 @@ def test_keyframes_put_the_engine_into_the_planned_poses(result, tmp_path):
         for side in ("left", "right"):
             np.testing.assert_allclose(data.site(side).xpos, arrays[f"{side}_foot"][k], atol=1e-5)
         np.testing.assert_allclose(data.ctrl, data.actuator_length, atol=1e-12)
+
+
+def test_a_reference_is_the_planned_motion_in_the_engine(result, tmp_path):
+    """Played back by the names in the engine's model of the plan: bodies are where it has them, and move as they are said to."""
+    mujoco = pytest.importorskip("mujoco")
+    write_as("npz", tmp_path / "gait.npz", result, 20)
+    reference, fps = np.load(tmp_path / "gait.npz"), 50.0
+    model = mujoco.MjModel.from_xml_string(make_plan_model(make_plan(result), Drive()))
+    data = mujoco.MjData(model)
+    bodies, joints = (reference[name].tolist() for name in ("body_names", "joint_names"))
+    assert reference["fps"] == fps and set(joints) == set(result.problem.display.robot.joints)
+    root = bodies.index(result.problem.display.robot.root)
+    for k in range(len(reference["joint_pos"])):
+        data.qpos[:7] = *reference["body_pos_w"][k, root], *reference["body_quat_w"][k, root]
+        for i in range(1, model.njnt):
+            data.qpos[6 + i] = reference["joint_pos"][k, joints.index(model.joint(i).name)]
+        mujoco.mj_forward(model, data)
+        for i in range(1, model.nbody):
+            place = reference["body_pos_w"][k, bodies.index(model.body(i).name)]
+            np.testing.assert_allclose(data.body(i).xpos, place, atol=1e-9)
+    place, velocity = reference["body_pos_w"], reference["body_lin_vel_w"]
+    differences = (place[2:] - place[:-2]) * fps / 2
+    np.testing.assert_allclose(velocity[1:-1], differences, atol=0.05 * np.abs(velocity).max())
 
 
 def test_what_a_problem_has_not_is_refused(tmp_path):
