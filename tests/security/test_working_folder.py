@@ -24,7 +24,7 @@ PROGRAM = (
 )
 CALLS = (
     tuple("compare walk12 --algorithms pso --starts 0 --runs 2 --evaluations 60 --jobs 2 --out ../out".split()),
-    ("solve", "walk12", "--starts", "1", "--solver", "nlpsol"),
+    ("solve", "walk12", "--starts", "1"),
 )
 
 

@@ -5,14 +5,13 @@ from dataclasses import fields
 from typing import Any
 
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.backends.solvers.nlpsol import Nlpsol
 from nlp_gait.backends.solvers.slsqp import Slsqp
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError, check_name, unknown
 from nlp_gait.files import convert_errors
 
-SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptSettings, Slsqp, Nlpsol)}
+SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptSettings, Slsqp)}
 
 
 def make_solver(name: str, /, **settings: Any) -> Solver:

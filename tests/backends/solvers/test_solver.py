@@ -8,14 +8,11 @@ import pytest
 from threadpoolctl import threadpool_info
 
 import nlp_gait
-from compare.study.run import ProblemSpec, Run, Stop
-from nlp_gait.backends.solvers import nlpsol
+from compare.study.run import ProblemSpec
 from nlp_gait.backends.solvers import solver as solver_module
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.backends.solvers.registry import make_solver
 from nlp_gait.backends.solvers.solver import CasadiBlas, IterationWatch, WatchedSolver
 from nlp_gait.errors import InputError
-from tests.compare.records import run_once
 
 WALK = ProblemSpec(name="walk12")
 
@@ -87,21 +84,6 @@ def test_an_iteration_of_a_large_problem_that_does_not_end_is_killed(presses: bo
     assert time.perf_counter() - started < 10.0 + solver_module.GRACE_S
     assert watch.reason == ("Interrupted" if presses else "Killed") and not solver.stats()["success"]
     assert result["x"].min() > 0.0  # it has moved
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["sqpmethod", "uno"])
-def test_other_solvers_heed_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    if nlpsol.probe(name) is not None:
-        pytest.skip("not here")
-    problem = nlp_gait.load("walk12")
-    slow_iterations(monkeypatch, 0.02)
-    end = make_solver("nlpsol", plugin=name, time_limit_s=0.03).run(
-        problem, problem.start_point(np.random.default_rng(0))
-    )
-    assert (end.converged, end.status) == (False, "stopped at the time limit") and end.iterations <= 3
-    record = run_once(Run(problem=WALK, solver="nlpsol", settings={"plugin": name}, stop=Stop(time_limit_s=0.03)))
-    assert record.status == "stopped at the time limit" and not record.reported_feasible and record.x
 
 
 def test_a_missing_linear_solver_is_reported_and_never_replaced() -> None:
