@@ -15,7 +15,7 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.errors import GaitError
 from nlp_gait.formulation import GaitProblem, Grid
-from nlp_gait.limits import FootClearance, FrictionCone, Limit, Point, Samples
+from nlp_gait.limits import FootClearance, FrictionCone, Limit, Point, Samples, make_rows_at_samples
 from nlp_gait.proofs.guarantee import guarantee
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -215,3 +215,17 @@ def test_a_limit_that_reads_what_a_motion_lacks_is_refused() -> None:
     problem = nlp_gait.load("nao-ssp").with_limits(single_support=[Unknown()])
     with pytest.raises(GaitError, match="temperature"):
         build_exact_model(problem)
+
+
+@pytest.mark.parametrize("derivatives", ["analytic", "finite-difference"])
+def test_a_quantity_that_no_limit_declares_is_evaluated_when_it_is_read(derivatives: str) -> None:
+    class Height(Limit):
+        """Height of the centre of mass."""
+
+        def add(self, at: Point, samples: Samples, ops: Any) -> Any:
+            return [make_rows_at_samples("height", "m", samples.com[2, :], ("com",), MX(0.1))], {}
+
+    problem = nlp_gait.load("nao-ssp", intervals=4, derivatives=derivatives).with_limits(single_support=[Height()])
+    x, model = 0.5 * (problem.lower + problem.upper), build_exact_model(problem)
+    heights = model.at(x, problem.p).g[[group == "height" for group in model.row_groups]]
+    np.testing.assert_allclose(heights, problem.signals(x).arrays["com"][:, 2], rtol=1e-12)

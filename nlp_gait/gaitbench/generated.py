@@ -140,19 +140,6 @@ def define(id: str) -> Definition:
     return draw_definition(id) if is_generated(id) else get_definition(id)
 
 
-def find_family(name: str) -> str | None:
-    """Return the family of an instance by its id, or the first one with the problem and held variables of this id or name."""
-    if is_generated(name):
-        return parse_id(name)[0].name
-    if name not in BY_ID and name not in PROBLEMS:
-        return None
-    problem, held = (BY_ID[name].problem, BY_ID[name].held) if name in BY_ID else (name, {})
-    alike = (
-        family.name for family in load_families().values() if (family.problem, {*family.held}) == (problem, {*held})
-    )
-    return next(alike, None)
-
-
 def draw_definition(id: str) -> Definition:
     """Return what a drawn instance is made from; raises as ``parse_id``."""
     family, draw = parse_id(id)

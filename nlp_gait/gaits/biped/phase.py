@@ -154,7 +154,10 @@ class Phase:
     @property
     def usual(self) -> tuple[Quantity, ...]:
         """Quantities that are evaluated together: those of every phase, and what its limits are likely to read besides."""
-        reads = (*self.goal.reads, *(quantity for limit in self.every_limit for quantity in limit.reads))
+        reads = (
+            *self.goal.reads,
+            *(quantity for limit in self.every_limit for quantity in getattr(limit, "reads", ())),
+        )
         return tuple(dict.fromkeys((*USUAL, *reads)))
 
     def _evaluate(self, points: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> SampledMotion:
