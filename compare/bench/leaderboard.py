@@ -18,9 +18,9 @@ from compare.study.record import RunRecord
 
 HOW = (
     "Every solver makes {runs} runs on each instance, with {evaluations} evaluations each, run k with the seed k; IPOPT and "
-    "SLSQP begin at a random point and end by themselves, SLSQP within the same budget and both within 60 s. What counts is what the "
-    "exact functions give. The mean rank is that of the expected running time over all instances and the targets {targets} above "
-    "the best known; equals share a rank, and pairs that no solver reached are left out."
+    "SLSQP begin at a random point and end by themselves, SLSQP within the same budget and both within 60 s. What counts is what "
+    "the exact functions give. The mean rank is that of the expected running time over all instances and the targets {targets} "
+    "above the best known; equals share a rank, and pairs that no solver reached are left out."
 )
 
 
