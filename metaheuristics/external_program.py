@@ -59,6 +59,7 @@ class ExternalProgram:
 class _ProgramSearch(CallingSearch):
     def __init__(self, settings: ExternalProgram, start: Start) -> None:
         self._settings, self._start, self._has_answered = settings, start, False
+        self._deadline = math.inf if start.time_limit_s is None else monotonic() + start.time_limit_s
         self._lines: queue.Queue[bytes | None] = queue.Queue(maxsize=MOST_WAITING)
 
     def run(self, evaluate: Evaluate) -> str:
@@ -89,6 +90,9 @@ class _ProgramSearch(CallingSearch):
             except Ended:
                 self._send(program, stop=True)
                 raise
+            except TimeoutError:
+                self._send(program, stop=True)
+                return "time limit reached"
             finally:
                 self._end(program, reader)
 
@@ -106,7 +110,7 @@ class _ProgramSearch(CallingSearch):
             program.stdin.flush()
 
     def _read(self, program: subprocess.Popen[bytes]) -> bytes | None:
-        """Return the program's next line, or None after the last one."""
+        """Return the program's next line, or None after the last one; raise TimeoutError at the end of the run's time."""
         limit = self._settings.answer_s if self._has_answered else self._settings.first_answer_s
         latest = monotonic() + limit
         while True:
@@ -116,10 +120,12 @@ class _ProgramSearch(CallingSearch):
             try:
                 line = self._lines.get(timeout=CHECKED_EVERY_S)
             except queue.Empty:
-                if monotonic() <= latest:
+                if monotonic() <= min(latest, self._deadline):
                     continue
                 if ended:
                     return None
+                if monotonic() <= latest:
+                    raise TimeoutError from None
                 raise SearchError(
                     f"the program sent nothing for {limit:g} s{'' if self._has_answered else SILENT}"
                 ) from None
