@@ -31,6 +31,7 @@ PANELS = {
     },
     "Questions": {
         "sweep": ("questions:sweep", "Solve a problem over a grid of values."),
+        "tune": ("questions:tune", "Tune a gait in the physics engine, beside IPOPT."),
         "prices": ("questions:prices", "What each limit and each error of the robot costs."),
         "pareto": ("questions:pareto", "Power against stability or speed."),
         "certainty": ("questions:certainty", "Is the best known optimum the global one?"),

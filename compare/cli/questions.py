@@ -4,11 +4,13 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from typer import Option
 
 from compare.cli import options
 from compare.cli.command import CONTINUE, command, describe_stored
 from compare.cli.printing import Output, Rows, describe_command, show_progress
+from compare.cli.simulate import ConditionOptions, DriveOptions
 from compare.questions.certainty import Certainty, search_point
 from compare.questions.pareto.pareto import Pareto, parse_searches
 from compare.questions.prices import Prices
@@ -17,9 +19,11 @@ from compare.questions.sweep import Sweep, parse_axis
 from compare.report.document import Table, iterate_leaves
 from compare.report.writing import add_origin
 from compare.study.memo import Memo
+from metaheuristics import make_algorithm
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError, OutputError
 from nlp_gait.files import make_writable_folder
+from nlp_gait.formulation import Result
 from nlp_gait.gaits.biped.cycle import SPEED
 from nlp_gait.interrupts import defer_interrupts
 from nlp_gait.proofs.certificate import check_certificate, load_certified_problem, read_certificate, repeat_proof
@@ -30,6 +34,7 @@ PROOF = "Of the proof [s], for at most four variables and NAO's phases; 0 for no
 CHECK = "Certificate to check instead: look for a better point, then repeat paths of its proof."
 COMPLETE = "With --check: also repeat the whole proof; rerun to continue."
 SEARCHES = "NSGA2 or CMOPSO; repeatable. 'none' for no search."
+TUNED_LIMITS = "Limit of IPOPT that is tuned in the engine; repeatable. Or NAME=V1,V2,..."
 ENGINE = "Simulate steps of each walking cycle in MuJoCo (extra sim)."
 
 
@@ -146,6 +151,47 @@ def sweep(
         problem = replace(problem, values=["objective=power", *(problem.values or ())])
     effort = {"starts": starts, "seed": seed, "steps": steps if engine else 0}
     return run_question(Sweep(problem=problem.load(), axes=axes, **effort), out)
+
+
+@command
+def tune(
+    *,
+    over: Annotated[list[str] | None, Option(metavar="NAME=LOW:HIGH:COUNT", help=TUNED_LIMITS)] = None,
+    algorithms: Annotated[str, Option(help="Searches, separated by commas.")] = "cma,pso,ga",
+    simulations: Annotated[int, Option(min=10, max=10**6, help="Of each search.")] = 300,
+    runs: options.Runs = 3,
+    seed: options.Seed = 0,
+    steps: Annotated[int, Option(min=1, max=1000, help="Of a cycle, that a search simulates.")] = 4,
+    problem: options.NamedProblem,
+    world: ConditionOptions,
+    drive_options: DriveOptions,
+    out: options.OutFolder = Path("tuned"),
+) -> Output:
+    """Tune a gait in MuJoCo (extra `sim`): searches whose scores are simulations, beside IPOPT's optimum of the model.
+
+    A score is the energy of the drives per metre; a gait must not fall, slip, miss its way or use torque limits for long. All are
+    judged after ten steps and on three held-out floors. Rerun the command to continue after an interruption. Example:
+    `nlp-gait tune nao-cycle --bumps-mm 1 --over ssp_dbm_y_mean_limit_m=0.003:0.02:5 --simulations 300 --out tuned`
+    """
+    from compare.questions.tune import Tune
+    from nlp_gait.simulation.plan import make_plan
+
+    names, loaded, axes = options.parse_names(algorithms), problem.load(), [parse_axis(text) for text in over or ()]
+    for name in names:
+        make_algorithm(name)
+    plan = make_plan(Result(problem=loaded, x=loaded.start_point(np.random.default_rng(seed))))
+    question = Tune(
+        problem=loaded,
+        drive=drive_options.make(plan),
+        conditions=world.make(),
+        limits=axes,
+        algorithms=names,
+        simulations=simulations,
+        runs=runs,
+        seed=seed,
+        steps=None if plan.from_rest_to_rest else steps,
+    )
+    return run_question(question, out)
 
 
 def run_question(question: Question[Any], out: Path) -> Output:

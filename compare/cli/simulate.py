@@ -13,7 +13,7 @@ from typer import Option
 
 from compare.analysis.units import format_millimetres, with_unit
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
-from compare.cli.options import StoredGait, parse_numbers
+from compare.cli.options import StoredGait, judge_gait, parse_numbers
 from compare.cli.printing import Output, Rows, show_progress
 from nlp_gait.errors import InputError, MissingExtraError, OutputError
 from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
@@ -32,7 +32,10 @@ DRIVE = (
     "40 ms, nothing fed forward. Or a file with settings of drive and feedback."
 )
 TORQUES = "urdf, stall or continuous: published limits differ; joints without motor data have the file's."
-FEEDBACK = "none, in open loop; balance: footholds, times of steps and torques by the measured state (extra sim)."
+FEEDBACK = (
+    "balance: footholds, times of steps and torques by the measured state (extra sim), the default of walks from rest to rest; "
+    "none: open loop, the default of phases and cycles."
+)
 SLOPE = "Rise of the floor forward and to the left, added to the slope of a walk planned for one; each below 45."
 LIVE = "Show it in MuJoCo's viewer in real time; arrow keys push the robot forward, backward, to the left and to the right."
 PUSH = "Impulse on the torso, forward and to the left [N s], and its begin [s] (default: in the middle)."
@@ -46,14 +49,16 @@ class DriveOptions:
     torque_limits: Annotated[str | None, Option(help=TORQUES)] = None
     feedback: Annotated[str | None, Option(help=FEEDBACK)] = None
 
-    def make(self) -> Drive:
-        """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
+    def make(self, plan: Plan) -> Drive:
+        """Return the drive for a plan; raises UnknownNameError, and InputError for a setting that is not allowed."""
         from nlp_gait.simulation.balance.drives import choose_feedback, load_drive
 
         drive = load_drive(self.drive)
         if self.torque_limits is not None:
             drive = replace(drive, torque_limits=self.torque_limits)
-        return drive if self.feedback is None else choose_feedback(drive, self.feedback)
+        if self.feedback is not None:
+            return choose_feedback(drive, self.feedback)
+        return choose_feedback(drive, "balance") if plan.from_rest_to_rest and drive.controller is None else drive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,14 +119,14 @@ def simulate(
     world: ConditionOptions,
     drive_options: DriveOptions,
 ) -> Output:
-    """Simulate a gait in MuJoCo (extra `sim`), open loop or with feedback, and compare it with the model's predictions.
+    """Simulate a gait in MuJoCo (extra `sim`) and compare it with the model's predictions; whole walks have balance feedback.
 
     Examples, after `nlp-gait solve nao-ssp --out best.json`: `nlp-gait simulate best.json --page walk.html`,
     `nlp-gait simulate best.json --push 0.5,0 --feedback balance`, `nlp-gait simulate best.json --drive slow.toml` with
 
         period_s = 0.02               # feed_forward = "torque", interpolation = "linear", torque_limits = "urdf"
 
-        [balance]                     # leave it out for open loop
+        [balance]                     # of walks, or with --feedback balance
         delay_s = 0.004
 
     A table `[controller]` with `kp`, `kd` and `gravity_compensation` instead is a PD controller with equal gains of all joints.
@@ -138,16 +143,19 @@ def simulate(
     if video is not None:
         check_video_path(video)
     folder = None if out is None else make_writable_folder(out)
-    drive, conditions = drive_options.make(), world.make()
+    conditions = world.make()
     with hold_robots():
         result = stored.load()
         plan = make_plan(result, steps)
+        drive = drive_options.make(plan)
+        faults = judge_gait(result, stored.result)
     if video is not None:
         check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
     simulation = SimulationRun(plan, conditions, drive, sole)
     pushes, failures = _watch(simulation) if live else ([], [])
     trace, written = simulation.finish(), [path for path in (page, video) if path is not None]
     data, parts = _report(plan, trace, drive, pushes)
+    data["faults"], parts = faults, [*faults, *parts]
     model, _ = prepare(plan, conditions, drive, sole)
     if page is not None:
         _write_page(page, make_skeleton(plan, trace, model, sole, result.problem.title), trace)
@@ -186,7 +194,9 @@ def _report(plan: Plan, trace: Simulation, drive: Drive, pushes: list[Push]) -> 
 
     walk = None if plan.steps is None else measure_walk(plan, trace, drive, plan.steps)
     report = measure(plan, trace, drive) if walk is None else walk.measurements
-    data, parts = {"schema": 1, **asdict(report), "pushes": [asdict(push) for push in pushes]}, [*_describe(report)]
+    mode = "in open loop" if drive.feedback is None else "with balance feedback"
+    data = {"schema": 1, **asdict(report), "mode": mode, "pushes": [asdict(push) for push in pushes]}
+    parts = [*_describe(report, mode)]
     if walk is not None:
         data |= {"walked_m": walk.walked_m, "planned_m": walk.planned_m, "energy_J": walk.engine_J}
         data["walk"] = walk.course()
@@ -195,6 +205,11 @@ def _report(plan: Plan, trace: Simulation, drive: Drive, pushes: list[Push]) -> 
         climb = measure_climb(plan, trace)
         data["climb"] = asdict(climb)
         parts.append(_describe_climb(climb))
+        parts += [
+            f"The swinging {hit.side} foot hits a riser at {hit.at_s:.2f} s: up to {hit.force_N:.0f} N, "
+            f"{1e3 * hit.contact_s:.0f} ms, {hit.impulse_Ns:.2f} N s"
+            for hit in climb.riser_hits
+        ]
     return data, parts
 
 
@@ -215,11 +230,11 @@ def _show_pictures(pictures: Iterator[Frame], count: int) -> Iterator[Frame]:
             advance("")
 
 
-def _describe(report: Measurements) -> Iterator[str | Rows]:
+def _describe(report: Measurements, mode: str) -> Iterator[str | Rows]:
     fate = "stays up" if report.fell_at_s is None else f"FALLS at {report.fell_at_s:.2f} s"
     if report.stepped_at_s is not None:
         fate = f"steps at {report.stepped_at_s:.2f} s and {fate}"
-    yield f"The robot {fate}; largest tilt {report.largest_tilt_deg:.1f} degrees"
+    yield f"The robot {fate} {mode}; largest tilt {report.largest_tilt_deg:.1f} degrees"
     powers = [
         (name, *(f"{watts:z.3f}" for watts in (power.mechanical_W, power.heat_W, power.total_W, power.signed_W)))
         for name, power in (("model", report.predicted), ("engine", report.measured))

@@ -206,7 +206,9 @@ def plan(
     `nlp-gait export walk.json --to csv --period-ms 1`
     """
     given = dict(options.parse_pairs(values, "--set"))
-    pairs = [("intervals", given.pop("intervals", "10")), ("limits", ",".join(limits or ()))]
+    pairs = [("limits", ",".join(limits or ()))]
+    if "intervals" in given:
+        pairs.append(("intervals", given.pop("intervals")))
     numbers = {name: options.parse_number(name, text, "--set") for name, text in given.items()}
     of_phases = options.parse_options("nao-walk", pairs)
     least = None if margins is None else options.parse_numbers("a margin", margins, "--margins")

@@ -23,6 +23,7 @@ DOORS = {
     "nlp_gait.simulation.drive": ("Drive",),
     "nlp_gait.simulation.simulate": ("Simulation", "simulate_plan"),
     "nlp_gait.simulation.measurements": ("Measurements", "average_pressure", "measure"),
+    "nlp_gait.simulation.objective": ("Arena", "EngineObjective", "GaitScore"),
     "nlp_gait.export.formats": ("FORMATS", "write_as"),
     "metaheuristics": (),
     "metaheuristics.multi_objective": ("ManyObjectives", "Snapshot", "make_front_algorithm", "minimize_many"),

@@ -21,6 +21,7 @@ ORDER = (
     "results_from_matlab.py",
     "custom_robot.py",
     "physics_engine.py",
+    "tune_in_engine.py",
     "export_motion.py",
     "compile_function.py",
     "notebook.py",

@@ -34,6 +34,10 @@ AT_BOUND = 1e-4  # share of a variable's range
 # Default least margins of the ZMP in a plan, along and across, as shares of a sole's length and width; chosen by energy against
 # the push survived, see ``benchmarks/humanoids.py``.
 MARGINS = (0.06, 0.08)
+# Intervals of each phase: of the first grid, of the grid on which energies are evaluated, and the most that are planned. The
+# planned energy on a grid must be as near to the fine one as this, otherwise the next grid is finer by a factor.
+FIRST_GRID, FINE_GRID, LAST_GRID = 10, 120, 40
+ENERGY_ERROR, FINER = 0.01, 1.5
 MANY_SOLVES = 10  # compiled functions pay, because they suit walks of any length and speed
 LEAST_MARGINS = ("dbm_x_min_limit_m", "dbm_y_min_limit_m")  # ends of the names of parameters
 MARGIN_WORDS = {
@@ -52,7 +56,7 @@ class WalkPlan:
     solution: Solution  #: of the solver, judged by the exact functions
     distance_m: float  #: that the feet advance
     duration_s: float  #: of the whole walk
-    energy_J: float  #: of the whole walk
+    energy_J: float  #: of the whole walk, on a fine grid
 
     @property
     def steps(self) -> int:
@@ -109,7 +113,7 @@ class WalkPlan:
 class WalkSettings:
     """How a walk is planned, wherever it leads."""
 
-    intervals: int = 10  #: of each phase
+    intervals: int | None = None  #: of each phase; None for as many as the energy needs
     limits: str = ""  #: added to every phase: names separated by commas, see ``nlp_gait.limits``
     values: Mapping[str, float] = field(default_factory=dict)  #: parameters and bounds of the problem, by name
     #: Least margins of the ZMP along and across, as shares of a sole; None for ``MARGINS``, or the problem's own if larger
@@ -120,7 +124,7 @@ class WalkSettings:
     @property
     def options(self) -> dict[str, Any]:
         """Those that are options of the problem."""
-        return {"intervals": self.intervals, "limits": self.limits}
+        return {"intervals": self.intervals or FIRST_GRID, "limits": self.limits}
 
     def apply(self, problem: GaitProblem) -> GaitProblem:
         """Return a walk with these margins and values; raises InputError for a margin that no sole has."""
@@ -323,9 +327,28 @@ def _solve(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkSettin
         if best.converged:
             break
     assert best is not None  # at least one start
-    indexes = build_exact_model(problem).at(best.best.x, problem.p).indexes
-    numbers = {name: float(indexes[name]) for name in ("distance_m", "duration_s", "energy_J")}
+    numbers = _evaluate(best, FINE_GRID)
+    while settings.intervals is None and best.converged:
+        intervals = int(best.problem.options["intervals"])
+        error = abs(_evaluate(best, intervals)["energy_J"] / numbers["energy_J"] - 1.0)
+        if error < ENERGY_ERROR or intervals >= LAST_GRID:
+            break
+        more = min(LAST_GRID, math.ceil(FINER * intervals))
+        settings.progress(f"{intervals} intervals of a phase: energy {error:.1%} off, now {more}")
+        finer = load(problem.name, **{**problem.options, "intervals": more}).with_values(**problem.values)
+        solution = solve(finer, x0=best.best.x, solver=IpoptSettings(few_rows=False), workers=1)
+        if not solution.feasible:
+            break
+        best, numbers = solution, _evaluate(solution, FINE_GRID)
     return WalkPlan(solution=best, **numbers)
+
+
+def _evaluate(solution: Solution, intervals: int) -> dict[str, float]:
+    """Return distance, duration and energy of a walk on a grid with at least so many intervals a phase."""
+    problem = solution.problem
+    fine = problem.dense(math.ceil(intervals / int(problem.options["intervals"]))) or problem
+    indexes = build_exact_model(fine).at(solution.best.x, fine.p).indexes
+    return {name: float(indexes[name]) for name in ("distance_m", "duration_s", "energy_J")}
 
 
 def _run_starts(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkSettings) -> Iterator[Solution]:

@@ -270,6 +270,17 @@ def _measure_walked_distance(simulation: Simulation, way: tuple[float, float]) -
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RiserHit:
+    """Contact of a swinging foot with a riser, the face of a step, during one swing."""
+
+    side: str
+    at_s: float  # begin
+    contact_s: float  # time in contact
+    force_N: float  # largest, along the contact's normal
+    impulse_Ns: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ClimbMeasurements:
     """A climb on stairs in numbers: one value for each time that a foot is planned to land, until a fall."""
 
@@ -279,6 +290,7 @@ class ClimbMeasurements:
     landing_errors_m: tuple[float, ...]  # distances from the planned footholds, in x and z
     hip_rises_m: tuple[float, ...]  # of the torso's origin since the last landing
     planned_rises_m: tuple[float, ...]
+    riser_hits: tuple[RiserHit, ...]  # at most one for each swing
 
 
 def measure_climb(plan: Plan, simulation: Simulation) -> ClimbMeasurements:
@@ -302,7 +314,27 @@ def measure_climb(plan: Plan, simulation: Simulation) -> ClimbMeasurements:
         landing_errors_m=tuple(errors),
         hip_rises_m=tuple(measured.tolist()),
         planned_rises_m=tuple(planned.tolist()),
+        riser_hits=_find_riser_hits(plan, simulation),
     )
+
+
+def _find_riser_hits(plan: Plan, simulation: Simulation) -> tuple[RiserHit, ...]:
+    hits = []
+    for i, side in enumerate(SIDES):
+        swings = np.diff(np.concatenate([[1.0], plan.bears(side, simulation.plan_t), [1.0]]))
+        for begin, end in zip(np.flatnonzero(swings < 0), np.flatnonzero(swings > 0), strict=True):
+            forces = simulation.risers[begin:end, i]
+            touching = np.flatnonzero(forces > LEAST_LOAD)
+            if touching.size:
+                hit = RiserHit(
+                    side=side,
+                    at_s=float(simulation.t[begin + touching[0]]),
+                    contact_s=TIME_STEP * touching.size,
+                    force_N=float(forces.max()),
+                    impulse_Ns=TIME_STEP * float(forces.sum()),
+                )
+                hits.append(hit)
+    return tuple(sorted(hits, key=lambda hit: hit.at_s))
 
 
 def _count_levels(plan: Plan) -> int:

@@ -16,6 +16,7 @@ from nlp_gait.robots import Robot
 SIDES = ("left", "right")
 ON_GROUND = 1e-6  # [m]; above the rounding of splines
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+AT_REST = 1e-3  # largest rate of a joint that stands still [rad/s]
 STANDING = 1e-9  # [m]; a sole that moves less is a support
 MOST_STEPS, LONGEST_S = 1000, 300.0  # of a walk: all measurements at every engine's step of 0.5 ms are in memory
 
@@ -48,6 +49,12 @@ class Plan:
     def duration_s(self) -> float:
         """Duration of the motion."""
         return float(self.signals.arrays["t"][-1])
+
+    @property
+    def from_rest_to_rest(self) -> bool:
+        """Whether it is a walk that begins and ends at rest."""
+        rates = self.rate("q", np.array([0.0, self.duration_s]))
+        return self.steps is not None and bool(np.abs(rates).max() < AT_REST)
 
     @cached_property
     def supports(self) -> tuple[str, ...]:

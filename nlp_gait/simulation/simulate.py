@@ -115,8 +115,9 @@ class SimulationRun:
         drive: Drive | None = None,
         sole: str = "rectangle",
         settle_s: float = SETTLE_TIME,
+        model: Any = None,
     ) -> None:
-        """Begin at the planned state, to end some time after the plan; raises MissingExtraError."""
+        """Begin at the planned state, to end some time after the plan, in this world of ``prepare``; MissingExtraError."""
         self._engine, self.plan = load_mujoco(), plan
         drive, self._conditions = drive or Drive(), conditions or Conditions()
         push, end_s = self._conditions.push, plan.duration_s + settle_s
@@ -124,7 +125,7 @@ class SimulationRun:
             raise InputError(
                 f"a push must begin from 0 s to the end of the simulation, {end_s:.4g} s, got {push.start_s:g} s"
             )
-        self.model, self.data = prepare(plan, self._conditions, drive, sole)
+        self.model, self.data = prepare(plan, self._conditions, drive, sole, model)
         self._addresses = Addresses(self.model, plan)
         steps = round((plan.duration_s + settle_s) / TIME_STEP)
         times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
@@ -242,18 +243,19 @@ def simulate_plan(
     return SimulationRun(plan, conditions, drive, sole).finish()
 
 
-def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:
-    """Return the engine's model and data, with the robot in its planned state at time zero."""
+def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str, model: Any = None) -> tuple[Any, Any]:
+    """Return the engine's model, or that of an earlier call, and its data, with the robot in its planned state at time zero."""
     engine = load_mujoco()
-    xml = make_plan_model(plan, drive, sole, conditions.friction, conditions.bumps, list_sensors(plan))
-    model = engine.MjModel.from_xml_string(xml)
-    model.body_mass *= conditions.mass_factor
-    model.body_inertia *= conditions.mass_factor
-    model.actuator_gainprm[:, 0] *= conditions.stiffness_factor
-    model.actuator_biasprm[:, 1] *= conditions.stiffness_factor
-    model.opt.gravity[:] = conditions.gravity(plan.gravity, plan.slope_rad)
+    if model is None:
+        xml = make_plan_model(plan, drive, sole, conditions.friction, conditions.bumps, list_sensors(plan))
+        model = engine.MjModel.from_xml_string(xml)
+        model.body_mass *= conditions.mass_factor
+        model.body_inertia *= conditions.mass_factor
+        model.actuator_gainprm[:, 0] *= conditions.stiffness_factor
+        model.actuator_biasprm[:, 1] *= conditions.stiffness_factor
+        model.opt.gravity[:] = conditions.gravity(plan.gravity, plan.slope_rad)
+        engine.mj_setConst(model, engine.MjData(model))
     data = engine.MjData(model)
-    engine.mj_setConst(model, data)
     addresses, start = Addresses(model, plan), np.zeros(1)
     data.qvel[:] = 0.0
     place_root(data.qpos, plan, plan.at("hip", start)[0], plan.attitude(start)[0])

@@ -46,7 +46,15 @@ FEWER = {
     "custom_robot.py": ("(0.0, 0.5, 1.0)", "(0.0,)"),
 }
 # Run by the gallery alone: they print no number, or those of a sweep, a study and a simulation, which tests of these check.
-GALLERY_ALONE = ("sweep.py", "front.py", "physics_engine.py", "notebook.py", "slider.py", "cluster.py")
+GALLERY_ALONE = (
+    "sweep.py",
+    "front.py",
+    "physics_engine.py",
+    "notebook.py",
+    "slider.py",
+    "cluster.py",
+    "tune_in_engine.py",
+)
 # For pages and commands; not in the gallery.
 WITHOUT_FIGURE = {"bring_your_own.py", "welded_beam.py"}
 

@@ -16,6 +16,7 @@ from nlp_gait.robots import Foot
 
 COLUMNS = "x_m,y_m,z_m,yaw_deg"
 MOST_FOOTHOLDS = 100
+FARTHEST_M, MOST_DEG = 1e4, 36000.0
 SWING_SAMPLES = 41  # of a swing, at which both soles are compared
 
 
@@ -51,8 +52,9 @@ def parse_footholds(text: str) -> tuple[Foothold, ...]:
             x, y, z, yaw = (float(cell) for cell in row.split(","))
         except ValueError:
             raise InputError(f"foothold {k} must be four numbers {COLUMNS}, got {row.strip()!r}") from None
-        if not all(math.isfinite(value) for value in (x, y, z, yaw)):
-            raise InputError(f"foothold {k} must have finite numbers, got {row.strip()!r}")
+        if not (abs(x) <= FARTHEST_M and abs(y) <= FARTHEST_M and abs(yaw) <= MOST_DEG and math.isfinite(z)):
+            limits = f"{FARTHEST_M:g} m and {MOST_DEG:g} degrees"
+            raise InputError(f"foothold {k} must be finite and within {limits} of the start, got {row.strip()!r}")
         if z:
             raise InputError(
                 f"foothold {k} is {z:g} m high, but footholds are planned on a level floor; write 0, or climb with stairs"

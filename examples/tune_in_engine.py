@@ -1,0 +1,12 @@
+"""Run a search on the physics engine: NAO's walking cycle, scored by the energy of the drives per metre (extra ``sim``)."""
+
+import nlp_gait
+from metaheuristics import ParticleSwarm, minimize
+from nlp_gait.simulation.objective import Arena, EngineObjective
+
+optimum = nlp_gait.solve("nao-cycle", starts=3)
+arena = Arena(nlp_gait.load("nao-cycle"), steps=2)
+found = minimize(EngineObjective([arena], threads=2), ParticleSwarm(population=10), evaluations=20, seed=0)
+print(
+    f"IPOPT: {arena.score(optimum.best.x).J_per_m:.2f} J/m; PSO: {found.objective:.2f} J/m, violation {found.violation:.2g}"
+)
