@@ -31,7 +31,7 @@ tasks = [
 if __name__ == "__main__":
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         study = Study(runs=tuple(tasks), folder=Path("study"), scheduler=cluster.scheduler_address)
-        records = run_study(study, progress=lambda task, record: print(record))
+        records = run_study(study, progress=print)
 
 # %%
 # The records are those of a study on one machine.
