@@ -144,3 +144,22 @@ def test_without_a_compiler_the_page_is_left_out(
     assert capsys.readouterr().out == f"the playground is left out: {sentence}\n"
     page = (tmp_path / "playground" / "index.md").read_text(encoding="utf-8")
     assert f"This build is without the playground: {sentence}." in page and "Open the playground" not in page
+
+
+@pytest.mark.parametrize(
+    "path", sorted((*ROOT.glob("docs/*.md"), *ROOT.glob("docs/model/*.md"), *ROOT.glob("*.md"))), ids=str
+)
+def test_commands_of_pages_exist_with_their_options(path: Path) -> None:
+    """In blocks of a shell and in backticks; the changelog names what is gone."""
+    known = {name for names in PANELS.values() for name in names}
+    text = path.read_text(encoding="utf-8") if path.name not in ("CHANGELOG.md", "changelog.md") else ""
+    for line in re.findall(r"nlp-gait ((?:[a-z]+)\b[^\n`#|;&]*)", re.sub(r"'[^'\n]*'", "", text)):
+        name, *words = line.split()
+        if name not in known:
+            assert not words or not any(word.startswith("--") for word in words), line
+            continue
+        options = {flag for p in load_command(name).params for flag in (*p.opts, *p.secondary_opts)} | {
+            "--help",
+            "--json",
+        }
+        assert {word.rstrip(".,)") for word in words if word.startswith("--")} <= options, line
