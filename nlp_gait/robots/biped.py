@@ -115,9 +115,9 @@ def make_biped_model(robot: Robot) -> Biped:
         raise InputError(f"robot {robot.name!r}: posture_rad must leave joint {turned[0]!r} above both legs at zero")
     full = pose_robot(robot, held)
     model = weld(full, list(held))
-    for joint in moving:
-        if fault := robot.unusable.get(joint):
-            raise InputError(f"robot {robot.name!r}: joint {joint!r} of a leg {fault}")
+    for joint in (*single[0], *single[1]):
+        if fault := robot.unusable.get(joint.child):
+            raise InputError(f"robot {robot.name!r}: joint {joint.name!r} of a leg {fault}")
     pairs = [(left.name, right.name) for left, right in zip(*single, strict=True)]
     notes = list(robot.notes)
     model = _tighten(model, pairs, notes)

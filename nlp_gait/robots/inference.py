@@ -31,6 +31,7 @@ CLEARLY_LOWER_M = 0.1  # the joints of the feet are lower than those of any othe
 CLEAR_LEAD_M = 0.03  # soles whose parts in front of and behind the ankle differ by this show the forward direction
 NEGLIGIBLE_INERTIA = 0.01  # of a link, as a share of that of the robot's mass at its size
 PAIRED_M, PAIRED_COSINE = 1e-2, 0.99  # axes of a pair of joints are images of each other to this
+LEAST_JOINTS = 3  # of limbs that may be legs
 LEAST_WIDTH_M = 0.01  # a narrower sole is a line or a point
 
 
@@ -93,7 +94,7 @@ def find_legs(robot: str, links: Links, joints: Joints, feet: Feet) -> Legs:
     for pair in combinations(sorted(chains), 2):
         legs = Legs(pair, _split_chains(chains[pair[0]], chains[pair[1]]))
         count = len(legs.chains[0])
-        if count != len(legs.chains[1]) or not count:
+        if count != len(legs.chains[1]) or count < LEAST_JOINTS:
             continue
         heights = [float(ankle[2]) for ankle in legs.ankles_m]
         fault, are_arms = _find_mirror_fault(legs), _are_arms(legs, links, chains)

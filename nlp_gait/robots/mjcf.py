@@ -55,17 +55,15 @@ def read_mjcf(path: str) -> RobotParts:
             hinges[names[i]] = hinge
     carriers = list_carriers(frames)
     unusable = {
-        model.joint(hinge).name: "has no actuator: it is not driven, and closed chains are not supported; add its motor"
-        for hinge in hinges.values()
+        body: "has no actuator: it is not driven, and closed chains are not supported; add its motor"
+        for body, hinge in hinges.items()
         if model.nu and not model.jnt_actfrclimited[hinge] and hinge not in _list_driven(model)
     }
     for equality in range(model.neq):
         kind = _name(model, "mjtEq", "mjEQ_", model.eq_type[equality])
-        for body in _list_coupled_bodies(model, equality, kind):
-            if (hinge := hinges.get(carriers.get(names.get(body, ""), ""))) is not None:
-                unusable[model.joint(hinge).name] = (
-                    f"is coupled by the equality {kind!r}: closed chains are not supported"
-                )
+        coupled = f"is coupled by the equality {kind!r}: closed chains are not supported"
+        bodies = [names[body] for body in _list_coupled_bodies(model, equality, kind) if body in names]
+        unusable |= {carriers[body]: coupled for body in bodies}
     notes += _list_ignored(model)
     read_shapes = partial(_read_foot_shapes, model, poses, names, frames)
     return join_frames(Path(path).stem, frames, turning, read_shapes, notes, unusable)

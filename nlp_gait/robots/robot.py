@@ -211,7 +211,7 @@ class Robot:
     #: angles of joints that a gait does not move; by default zero, or the nearest limit
     posture_rad: Mapping[str, float] = field(default_factory=dict)
     heat_loss_W_per_Nm2: float | None = None  #: heat of the motors per squared torque, if the robot's file states it
-    #: joints that the legs of a humanoid cannot have, such as coupled ones, and why, in words
+    #: by link, why the joint to it, such as a coupled one, cannot be part of a humanoid's leg, in words
     unusable: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()  #: what was inferred or changed when the robot was read; a sentence each
 

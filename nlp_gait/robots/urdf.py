@@ -26,7 +26,7 @@ from nlp_gait.robots.tree import Array, Mass, compute_point_inertia, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-LIMITS, DYNAMICS = ("effort", "velocity"), ("damping", "friction")
+LIMITS, DYNAMICS = ("effort", "velocity"), ("damping", "friction", "armature")  # the last one in files of Fourier
 OWNERS = ("robot", "link", "joint")
 # Attributes of the elements that are read, and elements without influence on a gait; others are listed as ignored.
 ATTRIBUTES = {
@@ -49,14 +49,8 @@ TURNING = ("revolute", "continuous")
 KINDS = (*TURNING, "prismatic", "floating", "planar", "fixed", "unknown")
 SHAPES = ("collision", "visual")
 WORLD = "world"
-XACRO = (
-    "}arg",
-    "}if",
-    "}include",
-    "}macro",
-    "}property",
-    "}unless",
-)  # ends of the names of elements that change others
+# Ends of the names of elements of xacro that change others.
+XACRO = ("}arg", "}if", "}include", "}macro", "}property", "}unless")
 MOST_PARTS = 2000  # links and joints; the time to read them grows with the square
 
 
@@ -80,13 +74,13 @@ def read_urdf(path: str, *, about_joint: bool = False) -> RobotParts:
         parent, turns = (joint_to[link].parent, joint_to[link].kind in TURNING) if link in joint_to else (None, False)
         frames[link] = LinkFrame(parent, turns, poses[link][:3, 3], _read_mass(element, poses[link], about_joint))
     notes, turning = _list_ignored(robot), [joint for joint in joints if joint.kind in TURNING]
-    unusable = {joint.name: fault for joint in turning if (fault := _find_unusable(joint))}
+    unusable = {joint.child: fault for joint in turning if (fault := _find_unusable(joint))}
     for key in LIMITS:
         zero = [joint for joint in turning if _read_limit(joint, key) == 0.0]
         if zero and len(zero) == len(turning):
             notes.append(f"{key} of every joint is 0: it is taken as not stated")
         else:
-            unusable |= {joint.name: f"has {key} 0 in its <limit>: {NOT_DRIVEN}" for joint in zero}
+            unusable |= {joint.child: f"has {key} 0 in its <limit>: {NOT_DRIVEN}" for joint in zero}
     read_shapes = partial(_read_foot_shapes, Path(path), links, poses, list_carriers(frames))
     read = [_read_turning(joint, poses[joint.child]) for joint in turning]
     return join_frames(name, frames, read, read_shapes, notes, unusable)
@@ -269,7 +263,7 @@ def _read_turning(joint: UrdfJoint, frame: Array) -> Joint:
         if soft is not None and soft.get(key) is not None:
             planned[k] = pick(planned[k], _read_number(soft, key))
     dynamics = _find_part(joint.element, "dynamics")
-    damping, friction = (0.0 if dynamics is None else _read_number(dynamics, key, "0") for key in DYNAMICS)
+    damping, friction, armature = (0.0 if dynamics is None else _read_number(dynamics, key, "0") for key in DYNAMICS)
     effort, velocity = (_read_limit(joint, key) or math.inf for key in LIMITS)
     direction = (1.0, 0.0, 0.0) if axis is None else _read_numbers(axis, "xyz", 3)
     return Joint(
@@ -284,6 +278,7 @@ def _read_turning(joint: UrdfJoint, frame: Array) -> Joint:
         torque_limit_Nm=effort,
         damping_Nms_rad=damping,
         friction_Nm=friction,
+        armature_kgm2=armature,
     )
 
 

@@ -42,7 +42,7 @@ class RobotParts(NamedTuple):
     carriers: Mapping[str, str]  # the link of ``links`` that each link of the file is part of
     read_shapes: ReadShapes
     notes: tuple[str, ...]  # what of the file is not used, and what it does not state
-    unusable: Mapping[str, str]  # by joint, why it cannot be part of a leg, in words
+    unusable: Mapping[str, str]  # by link, why its joint cannot be part of a leg, in words
 
 
 def list_carriers(frames: Mapping[str, LinkFrame]) -> dict[str, str]:

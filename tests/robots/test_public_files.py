@@ -14,6 +14,7 @@ from casadi import DM, SX
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError, RobotDataError
 from nlp_gait.formulation import load
+from nlp_gait.gaits.humanoid.body import list_joints, make_humanoid
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import Biped, make_biped_model
 from nlp_gait.robots.tree import make_tree
@@ -77,6 +78,13 @@ def test_both_sides_have_the_tighter_limits(tmp_path: Path, plain: Biped, weak: 
     assert biped.model.joint("A_hip_roll").limits_rad == (-0.5, 0.5)
     assert any("A_ankle_pitch and B_ankle_pitch have different limits of torque" in note for note in biped.full.notes)
     assert not biped.differences and not plain.differences
+
+
+def test_the_table_of_joints_has_both_sides_where_they_differ(tmp_path: Path) -> None:
+    read(tmp_path, inside("B_ankle_pitch", "60.0", "25"))
+    rows = {row[0]: row for row in list_joints(make_humanoid(str(tmp_path / "crooked.urdf")))}
+    assert rows["A_ankle_pitch"] == ("A_ankle_pitch", "-1.2", "0.9", "60 / 25", "6", "0", "0")
+    assert rows["A_hip_roll"] == ("A_hip_roll", "-0.5", "0.5", "60", "6", "0", "0")
 
 
 @pytest.mark.parametrize(
@@ -148,7 +156,7 @@ def test_what_is_not_read_is_listed_and_what_is_tighter_is_used(tmp_path: Path) 
         inside(
             "A_knee",
             "</joint>",
-            '<safety_controller soft_upper_limit="1.9"/><dynamics damping="0.4" friction="0.2"/></joint>',
+            '<safety_controller soft_upper_limit="1.9"/><dynamics damping="0.4" friction="0.2" armature="0.1"/></joint>',
         ),
         change("<inertial>", '<inertial name="i">', 1),
         change('<robot name="crooked">', '<robot name="crooked" xmlns="http://www.ros.org"><transmission/>'),
@@ -158,7 +166,8 @@ def test_what_is_not_read_is_listed_and_what_is_tighter_is_used(tmp_path: Path) 
         for note in biped.full.notes
     )
     knee = biped.model.joint("A_knee")
-    assert (knee.damping_Nms_rad, knee.friction_Nm, knee.planning_limits_rad[1]) == (0.4, 0.2, 1.9)
+    assert (knee.damping_Nms_rad, knee.friction_Nm, knee.armature_kgm2) == (0.4, 0.2, 0.1)
+    assert knee.planning_limits_rad[1] == 1.9
 
 
 @pytest.mark.parametrize(
