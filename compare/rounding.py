@@ -23,6 +23,7 @@ from nlp_gait.proofs.boxes import Numbers, halve
 BOXES = 64  # parts of the box, at most
 COST_SHARE = 0.05  # a part is split while its cost may exceed what was found by this share of the range found
 SAMPLES = 100  # random points and corners
+FEW_DIGITS = 10  # of a printed number; more are exact for all that is judged
 
 Where = Literal["everywhere", "somewhere", "nowhere"]
 How = Literal["enclosed", "evaluated", "sampled"]
@@ -124,6 +125,25 @@ def evaluate_rounded(problem: GaitProblem, printed: Sequence[str], claimed: str 
         at_worst=describe(max(points, key=lambda point: point.excess.max())),
         claim=claim,
     )
+
+
+def find_feasible(problem: GaitProblem, printed: Sequence[str]) -> Array | None:
+    """Return the point (n,) nearest to the printed one that rounds to it and is feasible; None if no point that is tried is.
+
+    Points with more than ``FEW_DIGITS`` digits stand for themselves. Raises InputError for texts that are not finite numbers.
+    """
+    x, model = np.array([float(text) for text in printed]), build_exact_model(problem)
+    if max(len(Decimal(text.strip()).as_tuple().digits) for text in printed) > FEW_DIGITS:
+        return None
+    box = np.array([_read_interval(name, text) for name, text in zip(problem.names, printed, strict=True)])
+    rng = np.random.default_rng(0)
+    places = np.concatenate([rng.uniform(size=(SAMPLES, len(x))), rng.integers(2, size=(SAMPLES, len(x)))])
+    points = np.clip(box[:, 0] + places * np.diff(box)[:, 0], problem.lower, problem.upper)
+    distances = np.abs((points - x) / np.diff(box)[:, 0]).max(axis=1)
+    for point in points[np.argsort(distances)]:
+        if ((box[:, 0] <= point) & (point <= box[:, 1])).all() and model.at(point, problem.p).feasible:
+            return point
+    return None
 
 
 def _read_interval(name: str, text: str) -> tuple[float, float]:

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from compare.judge import evaluate
+from compare.rounding import find_feasible
 from compare.study.record import History, RunRecord, Times, describe_evaluation, list_versions
 from compare.study.references import SAME_VALUE, find_reference
 from compare.study.run import LABEL, Inputs, ProblemSpec
 from compare.study.study import read_records, read_study_file
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
 from nlp_gait.columns import CsvTable, read_table
 from nlp_gait.errors import InputError
@@ -79,6 +81,7 @@ def import_runs(
         raise InputError(f"--as takes letters, digits, spaces and . _ + : ( ) -, 64 at most, got {label!r}")
     problem = spec.load()
     table, points = read_points(finals, problem, FINALS)
+    order = [table.header.index(name) for name in problem.names] if table.header else list(range(table.width))
     given = {name: None if name in problem.names else table.column(name) for name in FINALS}
     runs = [table.count("run", k, v) for k, v in enumerate(given["run"] or range(len(points)))]
     if len(set(runs)) < len(runs):
@@ -89,6 +92,7 @@ def import_runs(
     records = []
     for k, (run, x) in enumerate(zip(runs, points, strict=True)):
         row = {name: math.nan if column is None else column[k] for name, column in given.items()}
+        x, note = _choose_point(problem, x, [table.texts[k][place] for place in order])
         judged = describe_evaluation(evaluate(problem, x, prove=False))
         for name, least in LEAST.items():
             table.number(name, k, row[name], least)
@@ -111,7 +115,7 @@ def import_runs(
                     imported=hash_json(content),
                 ),
                 settings={"kind": "imported", "file": finals.name},
-                status=f"imported from {finals.name}{cut}",
+                status=f"imported from {finals.name}{note}{cut}",
                 reported_feasible=reported is not None and not row["violation"] > 0.0,
                 x=problem.by_name(x),
                 reported_objective=reported,
@@ -124,6 +128,13 @@ def import_runs(
         )
         progress(k + 1, len(points))
     return records
+
+
+def _choose_point(problem: GaitProblem, x: Array, printed: Sequence[str]) -> tuple[Array, str]:
+    """Return a point, or if it is infeasible a feasible one that rounds to its printed digits, and a note on that."""
+    model = build_exact_model(problem)
+    near = None if model.at(x, problem.p).feasible else find_feasible(problem, printed)
+    return (x, "") if near is None else (near, "; judged at a feasible point that rounds to its printed digits")
 
 
 def _make_history(
