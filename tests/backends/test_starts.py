@@ -127,7 +127,7 @@ def test_what_a_run_raises_is_raised_and_a_dead_process_is_reported() -> None:
 
     with pytest.raises(InputError, match="not this one"):
         nlp_gait.solve(problem, starts=3, solver=Scripted(first=first, at_first=refuse), workers=2)
-    with pytest.raises(WorkerError, match="exit code 7"):
+    with pytest.raises(WorkerError, match="by status 7"):
         nlp_gait.solve(problem, starts=3, solver=Scripted(first=first, at_first=lambda: os._exit(7)), workers=2)
     assert not multiprocessing.active_children()
 

@@ -117,54 +117,39 @@ def limit_casadi_threads() -> None:
     ThreadpoolController().select(internal_api=CasadiBlas.internal_api).limit(limits=1)
 
 
+class RunLimits(threading.local):
+    """Limits of the run of each thread, and why it was ended."""
+
+    def __init__(self) -> None:
+        self.stop: Callable[[], bool] = never
+        self.deadline = math.inf  # a time of ``time.perf_counter`` [s]
+        self.left = math.inf  # iterations
+        self.seen = 0  # iterates of this stage
+        self.reason = ""  # as IPOPT would report it
+        self.send: Callable[[bytes], None] | None = None  # receives all iterates, see ``_pack_iterate``
+
+
 class IterationWatch(ca.Callback):
     """CasADi's ``iteration_callback``; it does not alter the iterations, and must live as long as its solver."""
 
-    def __init__(self, nlp: Mapping[str, MX], shared: "IterationWatch | None" = None) -> None:
-        """Make a watch for an NLP, to which ``begin`` of another watch applies if it is shared."""
+    def __init__(self, nlp: Mapping[str, MX], limits: RunLimits | None = None) -> None:
+        """Make a watch for an NLP, which may share the limits of another one."""
         ca.Callback.__init__(self)
         n, m, k = (nlp[name].shape[0] for name in ("x", "g", "p"))
         self._sizes = {"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": k}
-        self._of_thread: threading.local = threading.local() if shared is None else shared._of_thread
+        self.limits = limits or RunLimits()
         self.construct("watch", {})
 
     def begin(self, stop: Callable[[], bool], deadline: float, iterations: float = math.inf) -> None:
-        """Watch the next run of this thread, until ``stop`` returns True.
-
-        ``deadline``, a time of ``time.perf_counter`` [s], and ``iterations`` are limits of all its stages together.
-        """
+        """Watch the next run of this thread, until ``stop`` returns True or a limit of all of its stages together is reached."""
         limit_casadi_threads()
-        self._of_thread.stop, self._of_thread.deadline, self._of_thread.reason = stop, deadline, ""
-        self._of_thread.left, self._of_thread.seen = iterations, 0
-
-    def count(self, iterations: int) -> None:
-        """Count the iterations of a finished stage."""
-        self._of_thread.left, self._of_thread.seen = self._of_thread.left - iterations, 0
-
-    def end(self, reason: str) -> None:
-        """Say why the run of this thread ends."""
-        self._of_thread.reason = reason
-
-    def send_iterates(self, send: Callable[[bytes], None]) -> None:
-        """Send all iterates of this thread's run, see ``_pack_iterate``; ``stop`` is asked no more."""
-        self._of_thread.stop, self._of_thread.send = never, send
-
-    @property
-    def stop(self) -> Callable[[], bool]:
-        """Whether to end the run of this thread at once."""
-        stop: Callable[[], bool] = getattr(self._of_thread, "stop", never)
-        return stop
-
-    @property
-    def deadline(self) -> float:
-        """Of the run of this thread, a time of ``time.perf_counter`` [s]."""
-        deadline: float = getattr(self._of_thread, "deadline", math.inf)
-        return deadline
+        limits = self.limits
+        limits.stop, limits.deadline, limits.left, limits.seen, limits.reason = stop, deadline, iterations, 0, ""
 
     @property
     def reason(self) -> str:
-        """Why the watch ended the run of this thread, as IPOPT would report it; empty if it did not."""
-        return getattr(self._of_thread, "reason", "")
+        """Why the watch ended the run of this thread; empty if it did not."""
+        return self.limits.reason
 
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
@@ -177,17 +162,17 @@ class IterationWatch(ca.Callback):
 
     def eval(self, iterate: Sequence[ca.DM] | None) -> list[int]:
         """Return 1 to end the run, 0 to continue."""
-        send = getattr(self._of_thread, "send", None)
-        if send is not None and iterate is not None:
-            send(_pack_iterate(dict(zip(self._sizes, iterate, strict=True))))
-        self._of_thread.seen += 1  # the start point is seen, too
-        if self.stop():
-            self.end(INTERRUPTED)
-        elif self._of_thread.seen > self._of_thread.left:
-            self.end(TOO_MANY)
-        elif time.perf_counter() >= self.deadline:
-            self.end(TIME_IS_UP)
-        return [int(bool(self.reason))]
+        limits = self.limits
+        if limits.send is not None and iterate is not None:
+            limits.send(_pack_iterate(dict(zip(self._sizes, iterate, strict=True))))
+        limits.seen += 1  # the start point is seen, too
+        if limits.stop():
+            limits.reason = INTERRUPTED
+        elif limits.seen > limits.left:
+            limits.reason = TOO_MANY
+        elif time.perf_counter() >= limits.deadline:
+            limits.reason = TIME_IS_UP
+        return [int(bool(limits.reason))]
 
 
 class WatchedSolver:
@@ -212,32 +197,32 @@ class WatchedSolver:
             result = self._call_in_fork(arguments)
         else:
             result, self._stats = self._solver(**arguments), self._solver.stats()
-        self._watch.count(int(self._stats["iter_count"]))
+        limits = self._watch.limits
+        limits.left, limits.seen = limits.left - int(self._stats["iter_count"]), 0
         return result
 
     def _call_in_fork(self, arguments: Mapping[str, Any]) -> Mapping[str, Any]:
-        watch, solver = self._watch, self._solver
+        limits, solver = self._watch.limits, self._solver
         n, m = len(arguments["lbx"]), len(arguments["lbg"])
         iterates = [_pack_iterate({"x": arguments["x0"], "lam_x": np.zeros(n), "lam_g": np.zeros(m)})]
 
         def call(send: Callable[[bytes], None]) -> dict[str, Any]:
-            watch.send_iterates(send)
+            limits.stop, limits.send = never, send  # the parent asks
             result, stats = solver(**arguments), solver.stats()
             send(_pack_iterate(result))
             counts = {name: count for name, count in stats.items() if name.startswith("n_call_")}
             ending = {name: stats[name] for name in ("iter_count", "return_status", "success")}
-            return {"reason": watch.reason, "stats": {**counts, **ending}}
+            return {"reason": limits.reason, "stats": {**counts, **ending}}
 
         def keep(iterate: bytes) -> None:
             iterates[:] = [iterate]
 
         try:
-            ended = run_alone(call, lambda: watch.stop() or time.perf_counter() > watch.deadline + GRACE_S, keep)
+            ended = run_alone(call, lambda: limits.stop() or time.perf_counter() > limits.deadline + GRACE_S, keep)
         except TimeoutError:
-            reason = INTERRUPTED if watch.stop() else KILLED
+            reason = INTERRUPTED if limits.stop() else KILLED
             ended = {"reason": reason, "stats": {"iter_count": 0, "return_status": reason, "success": False}}
-        watch.end(ended["reason"])
-        self._stats = ended["stats"]
+        limits.reason, self._stats = ended["reason"], ended["stats"]
         x, lam_x, lam_g = np.split(np.frombuffer(iterates[-1]), (n, 2 * n))
         return {"x": x, "lam_x": lam_x, "lam_g": lam_g}
 

@@ -108,6 +108,6 @@ class WorkingSet:
             all_weights[rows] = weights
             hessian = functions["nlp_hess_l"](x, p, weight, all_weights)
             derivatives["hess_lag"] = ca.Function(DERIVATIVES["hess_lag"], [x, p, weight, weights], [hessian])
-        watch = IterationWatch(nlp, shared=self._watch)
+        watch = IterationWatch(nlp, self._watch.limits)
         options = {**self._options, **NO_OTHERS, **derivatives, "iteration_callback": watch}
         return WatchedSolver(ca.nlpsol("some_rows", "ipopt", nlp, options), watch)

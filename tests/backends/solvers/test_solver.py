@@ -78,10 +78,10 @@ def test_an_iteration_of_a_large_problem_that_does_not_end_is_killed(presses: bo
     options = {"ipopt.hessian_approximation": "limited-memory", "ipopt.print_level": 0, "print_time": False}
     solver = WatchedSolver(ca.nlpsol("solver", "ipopt", nlp, {**options, "iteration_callback": watch}), watch)
     started = time.perf_counter()
-    watch.begin(lambda: presses and time.perf_counter() > started + 1.0, started + (60.0 if presses else 1.0))
+    watch.begin(lambda: presses and time.perf_counter() > started + 1.0, started + (60.0 if presses else 4.0))
     start = np.zeros(solver_module.LARGE)
     result = solver(x0=start, p=0.0, lbx=start - 9.0, ubx=start + 9.0, lbg=[-9.0], ubg=[9.0])
-    assert time.perf_counter() - started < 10.0 + solver_module.GRACE_S
+    assert time.perf_counter() - started < 14.0 + solver_module.GRACE_S
     assert watch.reason == ("Interrupted" if presses else "Killed") and not solver.stats()["success"]
     assert result["x"].min() > 0.0  # it has moved
 
