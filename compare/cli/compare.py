@@ -163,7 +163,7 @@ def run_in_folder(
     study.check()  # before the folder names it
     write_command(out, settings, describe_command())
     gaps = LiveGaps()
-    with show_progress("runs", len(study.runs)) as advance:
+    with show_progress("runs", len(study.runs), "building and compiling") as advance:
         try:
             return run_study(
                 study,

@@ -167,6 +167,8 @@ class ProgressLine:
 
     def __call__(self, note: str, steps: int = 1) -> None:
         """Count a step and show its note; more steps than one were done by an earlier command."""
+        if steps == 0:
+            return
         self.done, self.note = self.done + steps, "; ".join(note.splitlines())
         self.fresh += steps == 1
         if not self.on_terminal:
@@ -212,12 +214,13 @@ def format_duration(seconds: float) -> str:
 
 
 @contextmanager
-def show_progress(description: str, total: int | None) -> Iterator[Callable[..., None]]:
-    """Show progress on stderr, of unknown length if total is None.
+def show_progress(description: str, total: int | None, first: str = "") -> Iterator[Callable[..., None]]:
+    """Show progress on stderr, of unknown length if total is None; ``first`` is the note before the first step.
 
     The yielded function takes a note, and steps other than 1 for what an earlier command did.
     """
     line = ProgressLine(description, total, stderr.is_terminal)
+    line.note = first
     before, shown[0] = shown[0], line
     ticker = threading.Thread(target=line.keep_showing, daemon=True)
     if line.on_terminal:

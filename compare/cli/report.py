@@ -17,7 +17,7 @@ from nlp_gait.errors import InputError
 CSV = "Write all runs and all judged points as CSV files too."
 LATEX = "Also write tables for papers: of each problem, and of all problems and solvers (LaTeX, package booktabs)."
 DIGITS = "Decimals of objectives in these tables (default: as many as different medians need to differ)."
-FIGURES = "Also write all figures as PNG, and for papers as PDF, one column wide, with captions in LaTeX."
+FIGURES = "Also write all figures as PNG and, for papers, as PDF, with captions in figures.tex."
 WATCH = "Rewrite the report while the study runs; the open page reloads itself."
 OUT = "Folder for the report, its tables and figures; results stored in it are used again."
 QUICK = "The least work that fills every table and figure, instead of the paper's."

@@ -66,7 +66,7 @@ def solve(
     starts, stopped = loaded.hints.starts if starts is None else starts, ""
     with (
         report_interrupts("interrupted before there was a result; nothing was written"),
-        show_progress(f"{solver} starts", starts) as advance,
+        show_progress(f"{solver} starts", starts, "building and compiling") as advance,
     ):
         try:
             solution = nlp_gait.solve(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from compare.drawing.charts import HEIGHT, WIDTH, Chart, Series, draw_chart
-from compare.drawing.figures import LEGS, Look, assign_looks
+from compare.drawing.figures import LEGS
 from compare.drawing.shapes import LINE, Drawing, Label, Stroke, draw_legend, place_drawings
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result, sample_signals
@@ -59,22 +59,16 @@ def plot_gait(problem: GaitProblem, x: Array | Mapping[str, float], name: str) -
 
 
 def draw_gaits(gaits: Mapping[str, GaitCurves], *, curves: bool = True) -> list[Drawing]:
-    """Draw the first gait from the side with the second one laid over it, and the curves of all.
+    """Draw the first gait from the side, and the curves of all.
 
     Raises:
         InputError: there is nothing to draw.
     """
     charts = make_gait_charts(gaits) if curves else []
-    first, *later = gaits.values()
+    first = next(iter(gaits.values()))
     if first.skeleton is None and not charts:
         raise InputError("these gaits have neither a skeleton nor torques: there is nothing to draw")
-    over, panels = None, []
-    if later and later[0].skeleton is not None:
-        name = list(gaits)[1]
-        over = (name, later[0].skeleton, assign_looks(list(gaits))[name])
-    if first.skeleton is not None:
-        panels.append(draw_poses(first.skeleton, over))
-    return [*panels, *map(draw_chart, charts)]
+    return [*([] if first.skeleton is None else [draw_poses(first.skeleton)]), *map(draw_chart, charts)]
 
 
 def make_gait_charts(gaits: Mapping[str, GaitCurves]) -> list[Chart]:
@@ -101,8 +95,8 @@ class View(NamedTuple):
         return self.corner + self.scale * points[..., [0, 2]] * (1.0, -1.0)
 
 
-def draw_poses(first: Skeleton, over: tuple[str, Skeleton, Look] | None = None) -> Drawing:
-    """Draw poses of a gait from the side, later ones darker, some of another gait dashed over it, and a legend below."""
+def draw_poses(first: Skeleton) -> Drawing:
+    """Draw poses of a gait from the side, later ones darker, and a legend below."""
     low, high = first.box()
     low[2] = min(low[2], first.ground[:, 1].min() if first.planar else 0.0)
     ends = np.array([low - MARGIN, high + MARGIN])[:, [0, 2]] * (1.0, -1.0)
@@ -120,10 +114,5 @@ def draw_poses(first: Skeleton, over: tuple[str, Skeleton, Look] | None = None) 
             for side, points, width in parts
         ]
     legend = [("left leg", LEGS[LEFT], ""), ("right leg", LEGS[RIGHT], "")]
-    if over is not None:
-        name, skeleton, look = over
-        lines = [view.place(limb.points[k]) for k in (0, len(skeleton.t) // 2, -1) for limb in skeleton.limbs]
-        shapes.append(Stroke(lines=lines, colour=look.colour, dash="5 3"))
-        legend.append((name, look.colour, "5 3"))
     shapes += draw_legend(legend, LINE / 2, HEIGHT - LINE, WIDTH)[0]
     return Drawing(width=WIDTH, height=HEIGHT, shapes=shapes)
