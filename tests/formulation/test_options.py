@@ -32,6 +32,7 @@ OTHER: dict[str, Any] = {
     "motors": "limits",
     "limits": "FrictionCone",
     "drive_limits": False,
+    "alike": True,
     "angle_limits": False,
     "duration_s": 3.0,
     "instance": "walk12-w100",
