@@ -79,6 +79,7 @@ def _read_turning(model: Any, hinge: int, parent: str, child: str, pose: Array) 
         origin_m=(0.0, 0.0, 0.0),  # ``join_frames`` places it
         axis=make_unit_axis(to_vector(pose[:3, :3] @ model.jnt_axis[hinge])),
         limits_rad=(float(low), float(high)) if model.jnt_limited[hinge] else (-math.pi, math.pi),
+        velocity_limit_rad_s=math.inf,  # MJCF has none
         torque_limit_Nm=_find_torque_limit(model, hinge),
         armature_kgm2=float(model.dof_armature[rate]),
         damping_Nms_rad=float(np.ravel(model.dof_damping[rate])[0]),

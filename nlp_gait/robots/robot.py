@@ -147,8 +147,8 @@ class Joint:
     limits_rad: tuple[float, float]  #: (lower, upper) mechanical limits [rad]
     #: (lower, upper) limits of planned gaits [rad]; by default the mechanical ones
     planning_limits_rad: tuple[float, float] = ()  # type: ignore[assignment]
-    velocity_limit_rad_s: float = math.inf  #: infinite: no limit
-    torque_limit_Nm: float = math.inf  #: infinite: no limit
+    velocity_limit_rad_s: float  #: infinite: no limit
+    torque_limit_Nm: float  #: infinite: no limit
     armature_kgm2: float = 0.0  #: inertia of the rotor at the joint
     damping_Nms_rad: float = 0.0  #: friction torque per rate
     friction_Nm: float = 0.0  #: dry friction; in simulations only
