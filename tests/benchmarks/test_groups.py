@@ -15,7 +15,7 @@ from benchmarks.gaitbench import facts  # noqa: E402
 from nlp_gait.gaitbench.facts import load_facts  # noqa: E402
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", [name for name in benchmarks.GROUPS if name != benchmarks.SLOW])
 def test_a_group_measures(name):
     rows = benchmarks.GROUPS[name](1, 1)
@@ -34,7 +34,7 @@ def test_the_table_says_what_is_missed(tmp_path, monkeypatch, capsys):
     assert [row["met"] for row in json.loads((tmp_path / "rows.json").read_text())["rows"]] == [False, True]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_certificate_is_proven_again(tmp_path):
     certificates.prove(tmp_path, "dsp-v5-time05", tolerance=1e-2, hours=1.0)
     proven = json.loads((tmp_path / "dsp-v5-time05.json").read_text())["certificate"]
@@ -42,7 +42,7 @@ def test_a_certificate_is_proven_again(tmp_path):
     assert best * (1.0 - 1e-2) <= proven["bound"] <= best <= proven["objective"] + 1e-6
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_facts_and_best_known_values_are_found_again(tmp_path, monkeypatch):
     effort = facts.Effort(starts=((300, 1),), cma_runs=1, cma_evaluations=500, cma_most_variables=12)
     found = facts.find_facts("walk12-w015", effort, None)
