@@ -74,6 +74,7 @@ def test_the_planned_climb_is_climbed_with_the_planned_energy() -> None:
     assert trace.loads[-200:].sum(axis=1).mean() == pytest.approx(weight, rel=0.01)
 
 
+@pytest.mark.nightly
 def test_one_optimum_climbs_four_stairs_and_ten_from_standing_to_standing() -> None:
     problem = nlp_gait.load("stairs-climb")
     every_row = IpoptSettings(few_rows=False, iterations=600)  # learning the rows that matter pays from two starts on
