@@ -20,24 +20,15 @@ from compare.study.settings import SolverSpec
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
 
-SUITE = "small (ten instances, minutes), full, or drawn: instances of families that the baseline has, too."
-FAMILIES = "Only instances that these families draw, separated by commas: ssp, dsp, humanoid-ssp, ..."
-SEEDS = "Of the drawn instances: FIRST:END without END, or numbers separated by commas."
-ALGORITHM = "Your algorithm as my.py:MyAlgo or module:name, or a name; without it, only the baseline is shown."
-AGAINST = "Solvers that run beside yours where no baseline is shipped, separated by commas."
-AUDIT = "Examine --algorithm for biases instead: does it gain where the optimum is in the middle, or clip to bounds?"
-
 
 @dataclass(frozen=True, kw_only=True)
 class Instances:
     """Instances of GaitBench."""
 
-    suite: Annotated[Literal["small", "full", "drawn"], Option(help=SUITE)] = "small"
-    instances: Annotated[str | None, Option(help="Only these instances, separated by commas, instead of a suite.")] = (
-        None
-    )
-    families: Annotated[str | None, Option(help=FAMILIES)] = None
-    seeds: Annotated[str, Option(help=SEEDS)] = "0:5"
+    suite: Literal["small", "full", "drawn"] = "small"
+    instances: str | None = None
+    families: str | None = None
+    seeds: str = "0:5"
 
     @property
     def title(self) -> str:
@@ -49,23 +40,21 @@ class Instances:
 class BenchEffort:
     """What runs, and where its results are."""
 
-    against: Annotated[str, Option(help=AGAINST)] = "random,pso,de,cma"
-    runs: Annotated[int, Option(min=2, max=1000, help="Runs on each instance; the baseline has 15.")] = RUNS
+    against: str = "random,pso,de,cma"
+    runs: Annotated[int, Option(min=2, max=1000)] = RUNS
     evaluations: Evaluations = EVALUATIONS
-    out: Annotated[
-        Path, Option(help="Folder for the page and the records; finished runs in it are reused."), OUTPUT
-    ] = Path("bench")
+    out: Annotated[Path, OUTPUT] = Path("bench")
     jobs: Jobs = None
     scheduler: Scheduler = None
 
 
 @command
 def bench(
-    algorithm: Annotated[str | None, Option(help=ALGORITHM)] = None,
+    algorithm: str | None = None,
     *,
     chosen: Instances,
-    audit: Annotated[bool, Option(help=AUDIT)] = False,
-    label: Annotated[str, Option(help="Name of your algorithm on the page (default: its own name).")] = "",
+    audit: bool = False,
+    label: str = "",
     effort: BenchEffort,
 ) -> Output:
     """Run an algorithm on GaitBench and rank it with the shipped baseline, or with others that run beside it.

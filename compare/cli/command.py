@@ -1,7 +1,8 @@
 """Commands: groups of options, printed results, and exit by errors.
 
 Options of several commands form a group: a frozen dataclass whose fields are annotated like parameters of a Typer command. A
-command with a parameter of that type has every field as an option, and receives the dataclass.
+command with a parameter of that type has every field as an option, and receives the dataclass. The texts of options are in
+``help.toml``.
 """
 
 import errno
@@ -12,12 +13,17 @@ import math
 import os
 import select
 import sys
+import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from copy import copy
+from functools import cache
+from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
+from typer.models import ParameterInfo
 
 from compare.cli.printing import Output, fail, print_output, say_error
 from nlp_gait.errors import GaitError, InputError
@@ -45,10 +51,9 @@ NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 def command(function: Callable[..., Output]) -> Callable[..., None]:
     """Make a function a Typer command: groups become options, and its output is printed; expected errors are one sentence."""
-    listed = list_options(function).values()
-    options = [*(option.replace(kind=inspect.Parameter.KEYWORD_ONLY) for option in listed), JSON]
-    files = [option.name for option in options if OUTPUT_FILE in get_marks(option)]
-    if files:
+    options = [*(_add_help(function.__name__, option) for option in list_options(function).values()), JSON]
+    outputs = [option.name for option in options if OUTPUT_FILE in get_marks(option)]
+    if outputs:
         options.append(_add_flag("force", "--force", FORCE))
     adds_context = not any(option.annotation is typer.Context for option in options)
     options += [CONTEXT] * adds_context
@@ -62,8 +67,8 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
         try:
             with raise_interrupts():
                 _check_values(context, given)
-                force = given.pop("force", False) if files else False
-                for name in files:
+                force = given.pop("force", False) if outputs else False
+                for name in outputs:
                     if given[name] is not None:
                         check_output(given[name], force)
                 output = function(**pack_options(groups, given))
@@ -90,6 +95,25 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
 
     replace_signature(run, options)
     return run
+
+
+@cache
+def read_help() -> Mapping[str, Mapping[str, str]]:
+    """Return the texts of options by name, for each command's function, and under ``shared``."""
+    return tomllib.loads(files("compare.cli").joinpath("help.toml").read_text(encoding="utf-8"))
+
+
+def _add_help(function: str, option: inspect.Parameter) -> inspect.Parameter:
+    """Make an option keyword-only and add its text."""
+    text = read_help().get(function, {}).get(option.name) or read_help()["shared"].get(option.name)
+    marks = list(getattr(option.annotation, "__metadata__", ()))
+    infos = [copy(mark) for mark in marks if isinstance(mark, ParameterInfo)] or [typer.Option()]
+    if text is not None and infos[0].help is None:
+        infos[0].help = text
+        kind = get_args(option.annotation)[0] if marks else option.annotation
+        rest = [mark for mark in marks if not isinstance(mark, ParameterInfo)]
+        option = option.replace(annotation=Annotated[kind, infos[0], *rest])
+    return option.replace(kind=inspect.Parameter.KEYWORD_ONLY)
 
 
 def _check_values(context: typer.Context, given: Mapping[str, Any]) -> None:

@@ -31,13 +31,6 @@ from nlp_gait.interrupts import Interrupted
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 MOST_RUNS = 12  # of a problem whose runs are printed one by one
 ALL, ALL_GRADIENT = "all", (IPOPT, "slsqp")
-ALGORITHMS = (
-    "Searches and other solvers, separated by commas, see `nlp-gait list`; `pso` damps its inertia weight by 0.99 as the code "
-    "that the NAO paper cites, because the constant weight that the paper prints, `pso-constant`, does not settle; `all` stands "
-    "for every installed search, IPOPT and SLSQP."
-)
-HANDLING = "Constraints in searches: deb (feasibility rules), epsilon, or penalty=WEIGHT > 0 [objective/violation]."
-OUT = "Folder for records, report and figures; finished runs in it are reused."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,9 +40,9 @@ class SearchOptions:
     runs: options.Runs = 11
     seed: options.Seed = 0
     evaluations: options.Evaluations = 10_000
-    handling: Annotated[str, Option(help=HANDLING)] = "deb"
-    time_limit: Annotated[float | None, Option(min=1e-3, max=1e9, help="End a run after this many seconds.")] = None
-    polish: Annotated[bool, Option("--polish", help="IPOPT from each search's result, as another solver.")] = False
+    handling: str = "deb"
+    time_limit: Annotated[float | None, Option(min=0.001, max=1000000000.0)] = None
+    polish: Annotated[bool, Option("--polish")] = False
 
     def make_study(self, problems: Sequence[ProblemSpec], algorithms: str, starts: int) -> StudySettings:
         """Return the study of problems by IPOPT and the named solvers; InputError unless a penalty has a weight."""
@@ -86,18 +79,14 @@ def list_solver_names(algorithms: str, starts: int) -> list[str]:
 def compare(
     *,
     context: typer.Context,
-    problems: Annotated[
-        list[str] | None, Argument(metavar="[PROBLEM]...", help="Default: nao-ssp and nao-dsp.")
-    ] = None,
-    algorithms: Annotated[str, Option(help=ALGORITHMS)] = "pso,ga,aco",
-    starts: Annotated[
-        int, Option(min=0, max=100000, help="Starts of IPOPT and other gradient methods; each is a run.")
-    ] = 20,
+    problems: Annotated[list[str] | None, Argument(metavar="[PROBLEM]...")] = None,
+    algorithms: str = "pso,ga,aco",
+    starts: Annotated[int, Option(min=0, max=100000)] = 20,
     searches: SearchOptions,
     changes: options.ProblemOptions,
-    config: Annotated[Path | None, Option(help="Take the study from this TOML file instead."), SESSION] = None,
-    out: Annotated[Path, Option(help=OUT), OUTPUT] = options.RESULTS,
-    resume: Annotated[bool, Option("--resume", help="Continue the study in --out."), SESSION] = False,
+    config: Annotated[Path | None, SESSION] = None,
+    out: Annotated[Path, OUTPUT] = options.RESULTS,
+    resume: Annotated[bool, Option("--resume"), SESSION] = False,
     jobs: options.Jobs = None,
     code: options.Code = None,
     scheduler: options.Scheduler = None,

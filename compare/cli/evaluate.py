@@ -30,32 +30,20 @@ if TYPE_CHECKING:
 
 SHOWN_VIOLATIONS = 10
 USUAL_TOLERANCE = 1e-4  # of equations in the competitions of evolutionary computation
-X = "Decision variables in order, separated by commas; or a .csv file with one candidate per row."
-ROUNDED = "Judge all points that round to the digits of --x, not that point alone."
-CLAIMED = "With --rounded: the objective as printed; can a point have it?"
 
 
 @command
 def evaluate(
-    x: Annotated[str | None, Option("--x", help=X)] = None,
-    motion: Annotated[
-        Path | None, Option(help="Joint angles over time instead: a CSV with columns t and joints.")
-    ] = None,
-    touch_down: Annotated[
-        float | None,
-        Option(
-            min=0.0, max=300.0, help="Landing time of the swing foot of a cycle in --motion [s] (default: inferred)."
-        ),
-    ] = None,
-    engine: Annotated[bool, Option(help="Also simulate a motion in the physics engine (extra sim).")] = True,
+    x: Annotated[str | None, Option("--x")] = None,
+    motion: Path | None = None,
+    touch_down: Annotated[float | None, Option(min=0.0, max=300.0)] = None,
+    engine: bool = True,
     *,
     problem: AnyProblem,
-    rounded: Annotated[bool, Option("--rounded", help=ROUNDED)] = False,
-    claimed: Annotated[str | None, Option(metavar="VALUE", help=CLAIMED)] = None,
-    signals: Annotated[Path | None, Option(help="Write time histories to this .npz file."), OUTPUT_FILE] = None,
-    table: Annotated[
-        Path | None, Option("--csv", help="Write the judged points to this CSV file."), OUTPUT_FILE
-    ] = None,
+    rounded: Annotated[bool, Option("--rounded")] = False,
+    claimed: Annotated[str | None, Option(metavar="VALUE")] = None,
+    signals: Annotated[Path | None, OUTPUT_FILE] = None,
+    table: Annotated[Path | None, Option("--csv"), OUTPUT_FILE] = None,
 ) -> Output:
     """Evaluate candidates with the exact functions, at the problem's samples and on a dense grid.
 

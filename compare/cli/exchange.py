@@ -17,24 +17,16 @@ from compare.study.study import read_study_file, write_records
 from compare.study.verify import verify_study
 from nlp_gait.files import make_temporary_folder
 
-FINALS = "One row per run: the variables, and where known run, seed, objective, violation, evaluations, time_s."
-HISTORY = "Best so far: run, evaluations, objective and optionally time_s."
-EVALUATIONS = "Evaluations of every run, if neither file has them; leave it out if they are unknown."
-PACK = "Write the report, and pack the study for others."
-SHARE = "Runs to repeat, drawn at random; all by default."
-RUN_CODE = "Run user code that is packed in the archive: read it first."
-OUT = "Folder for the report and tables, written again from the records."
-
 
 @command
 def import_results(
     *,
     problem: NamedProblem,
-    finals: Annotated[Path, Argument(metavar="FINALS.csv", help=FINALS)],
-    history: Annotated[Path | None, Option(metavar="FILE.csv", help=HISTORY)] = None,
-    label: Annotated[str, Option("--as", help='Name in the report, for example "GA (MATLAB)".')],
-    evaluations: Annotated[int | None, Option(min=1, max=9223372036854775807, help=EVALUATIONS)] = None,
-    out: Annotated[Path, Option(help="Folder of a new or existing study."), OUTPUT] = RESULTS,
+    finals: Annotated[Path, Argument(metavar="FINALS.csv")],
+    history: Annotated[Path | None, Option(metavar="FILE.csv")] = None,
+    label: Annotated[str, Option("--as")],
+    evaluations: Annotated[int | None, Option(min=1, max=9223372036854775807)] = None,
+    out: Annotated[Path, OUTPUT] = RESULTS,
 ) -> Output:
     """Import results of other programs into a study, judged and reported like all others.
 
@@ -59,12 +51,12 @@ def import_results(
 @command
 def verify(
     *,
-    study: Annotated[Path, Argument(metavar="DIR_OR_ZIP", help="Folder of a study, or its archive.")],
-    pack: Annotated[Path | None, Option(metavar="FILE.zip", help=PACK), OUTPUT_FILE] = None,
-    share: Annotated[str, Option(metavar="SHARE", help=SHARE)] = "100%",
-    run_code: Annotated[bool, Option("--run-code", help=RUN_CODE)] = False,
+    study: Annotated[Path, Argument(metavar="DIR_OR_ZIP")],
+    pack: Annotated[Path | None, Option(metavar="FILE.zip"), OUTPUT_FILE] = None,
+    share: Annotated[str, Option(metavar="SHARE")] = "100%",
+    run_code: Annotated[bool, Option("--run-code")] = False,
     code: Code = None,
-    out: Annotated[Path | None, Option(help=OUT), OUTPUT] = None,
+    out: Annotated[Path | None, OUTPUT] = None,
 ) -> Output:
     """Check a study: evaluate every point again, repeat its runs, and write its report and tables again.
 

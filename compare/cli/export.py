@@ -19,21 +19,14 @@ from nlp_gait.files import check_output
 from nlp_gait.formulation import Result
 from nlp_gait.gaitbench.c_export import export_objective
 
-SOURCE = "A gait from `solve --out` or `plan --out`; for objective and solver a problem or an instance of GaitBench."
-KIND = (
-    "Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, npz, ros, html. Of a problem: objective (C++) or "
-    "solver (NLP with derivatives in C++)."
-)
-OUT = "File, by default next to the result; for objective and solver a folder."
-
 
 @command
 def export(
-    source: Annotated[str, Argument(metavar="RESULT.json|PROBLEM", help=SOURCE)],
+    source: Annotated[str, Argument(metavar="RESULT.json|PROBLEM")],
     *,
-    to: Annotated[str, Option(metavar="KIND", help=KIND)],
-    out: Annotated[Path | None, Option(help=OUT), OUTPUT] = None,
-    period_ms: Annotated[int, Option(min=1, max=86400000, help="Time between rows [ms].")] = PERIOD_MS,
+    to: Annotated[str, Option(metavar="KIND")],
+    out: Annotated[Path | None, OUTPUT] = None,
+    period_ms: Annotated[int, Option(min=1, max=86400000)] = PERIOD_MS,
     values: Values = None,
     limits: Limits = None,
     code: Code = None,

@@ -21,12 +21,6 @@ if TYPE_CHECKING:
     from compare.study.description import Description
 
 ALGORITHMS = "algorithms"  # the name that stands for all of them
-NAME = (
-    "A problem, for its variables, parameters and options; an algorithm or solver, for its settings; algorithms, for those of "
-    "all."
-)
-ROBOT = "Show a robot as read: URDF, MJCF (.xml), JSON, or a name; with a problem, that problem for this robot."
-CITE = "Print BibTeX of a problem, a paper or an instance of GaitBench; of all without NAME."
 OVERRIDE = (
     "override any of this in a JSON file next to the model, see docs/robots.md; gaits: solve humanoid-ssp, humanoid-dsp "
     "or humanoid-cycle with --robot {}; whole walks: plan --robot"
@@ -35,12 +29,10 @@ OVERRIDE = (
 
 @command
 def list_problems(
-    name: Annotated[str | None, Argument(metavar="[NAME]", help=NAME)] = None,
-    robot: Annotated[str | None, Option(metavar="FILE", help=ROBOT)] = None,
-    out: Annotated[
-        Path | None, Option(help="With --robot: figure of the robot and its soles, as PNG."), OUTPUT_FILE
-    ] = None,
-    cite: Annotated[bool, Option("--cite", help=CITE)] = False,
+    name: Annotated[str | None, Argument(metavar="[NAME]")] = None,
+    robot: Annotated[str | None, Option(metavar="FILE")] = None,
+    out: Annotated[Path | None, OUTPUT_FILE] = None,
+    cite: Annotated[bool, Option("--cite")] = False,
 ) -> Output:
     """List problems, algorithms and robots, or describe one of them.
 

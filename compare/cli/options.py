@@ -22,43 +22,27 @@ from nlp_gait.user_code import allow_code, is_reference
 
 LARGEST = sys.float_info.max
 RESULTS = Path("results")  # default folder
-Starts = Annotated[
-    int, Option(min=1, max=100000, help="Random starts within the bounds, where nothing better is known.")
-]
-Runs = Annotated[int, Option(min=1, max=100000, help="Runs of each search algorithm.")]
-Seed = Annotated[int, Option(min=0, help="Same seed, same result; run k uses seed + k.")]
-Evaluations = Annotated[int, Option(min=1, max=10**12, help="Budget of one search run.")]
-Jobs = Annotated[int | None, Option(min=1, max=4096, help="Worker processes (default: all processors)."), SESSION]
-Scheduler = Annotated[
-    str | None, Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead."), SESSION
-]
-OutFolder = Annotated[Path, Option(help="Folder for report, tables, figures, data and stored results."), OUTPUT]
-CODE = "Your code that the file refers to; it runs only if named here; repeatable."
-Code = Annotated[list[str] | None, Option(metavar="FILE.py:NAME", help=CODE), SESSION]
-PROBLEM = "For example nao-ssp, see `nlp-gait list`; an instance of GaitBench, ssp-v5 or gb2:ssp:3; or your own, FILE.py:NAME."
-ProblemName = Annotated[str, Argument(metavar="PROBLEM", help=PROBLEM)]
-ROBOT = (
-    "Of NAO and humanoid problems: nao-v5 (default), nao-v6, nao-v4, a robot file (.json, .urdf, .xml of MuJoCo), or "
-    "PACKAGE:NAME of an installed package."
-)
-Robot = Annotated[str | None, Option(help=ROBOT)]
-VALUES = (
-    "Option or parameter, see `nlp-gait list PROBLEM`; a variable, which is then fixed; or a bound, NAME.lower=VALUE; "
-    "repeatable."
-)
-Values = Annotated[list[str] | None, Option("--set", metavar="NAME=VALUE", help=VALUES)]
-LIMIT = "Add a limit to every phase: FrictionCone, FootClearance, or your own, FILE.py:NAME; repeatable."
-Limits = Annotated[list[str] | None, Option("--limit", metavar="NAME", help=LIMIT)]
+Starts = Annotated[int, Option(min=1, max=100000)]
+Runs = Annotated[int, Option(min=1, max=100000)]
+Seed = Annotated[int, Option(min=0)]
+Evaluations = Annotated[int, Option(min=1, max=10**12)]
+Jobs = Annotated[int | None, Option(min=1, max=4096), SESSION]
+Scheduler = Annotated[str | None, Option(metavar="ADDRESS"), SESSION]
+OutFolder = Annotated[Path, OUTPUT]
+Code = Annotated[list[str] | None, Option(metavar="FILE.py:NAME"), SESSION]
+ProblemName = Annotated[str, Argument(metavar="PROBLEM")]
+Robot = str | None
+Values = Annotated[list[str] | None, Option("--set", metavar="NAME=VALUE")]
+Limits = Annotated[list[str] | None, Option("--limit", metavar="NAME")]
 SLIGHT = 1e-3  # violation, as a share of a row's scale, and error of an objective that printed digits explain
 SHOWN = 3  # violated rows
-GAIT = "From `solve --out` or `plan --out`, a study's record, or written by hand."
 
 
 @dataclass(frozen=True, kw_only=True)
 class StoredGait:
     """A gait in a file, and the user code that it needs."""
 
-    result: Annotated[Path, Argument(metavar="RESULT.json", help=GAIT)]
+    result: Annotated[Path, Argument(metavar="RESULT.json")]
     code: Code = None
 
     def load(self) -> Result:
@@ -133,10 +117,7 @@ class NamedProblem(ProblemOptions):
 class AnyProblem(ProblemOptions):
     """A problem whose name may be left out where a file determines it."""
 
-    name: Annotated[
-        str | None,
-        Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out where a file names it."),
-    ] = None
+    name: Annotated[str | None, Argument(metavar="[PROBLEM]")] = None
 
     def spec(self) -> ProblemSpec:
         """Return the problem; raises as ``make_spec``."""

@@ -30,23 +30,17 @@ from nlp_gait.proofs.certificate import check_certificate, load_certified_proble
 
 FRONT_SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
 CYCLES = ("nao-cycle", "humanoid-cycle")  # whose speed is a parameter if the objective is the power
-PROOF = "Of the proof [s], for at most four variables and NAO's phases; 0 for none."
-CHECK = "Certificate to check instead: look for a better point, then repeat paths of its proof."
-COMPLETE = "With --check: also repeat the whole proof; rerun to continue."
-SEARCHES = "NSGA2 or CMOPSO; repeatable. 'none' for no search."
-TUNED_LIMITS = "Limit of IPOPT that is tuned in the engine; repeatable. Or NAME=V1,V2,..."
-ENGINE = "Simulate steps of each walking cycle in MuJoCo (extra sim)."
 
 
 @command
 def certainty(
     *,
-    starts: Annotated[int, Option(min=1, max=1000000, help="Random starts of IPOPT.")] = 10_000,
-    time_limit: Annotated[float, Option(min=0.0, max=1e9, help=PROOF)] = 1800.0,
+    starts: Annotated[int, Option(min=1, max=1000000)] = 10_000,
+    time_limit: Annotated[float, Option(min=0.0, max=1000000000.0)] = 1800.0,
     seed: options.Seed = 0,
     problem: options.AnyProblem,
-    check: Annotated[Path | None, Option(help=CHECK)] = None,
-    complete: Annotated[bool, Option("--complete", help=COMPLETE)] = False,
+    check: Path | None = None,
+    complete: Annotated[bool, Option("--complete")] = False,
     code: options.Code = None,
     out: options.OutFolder = Path("certainty"),
 ) -> Output:
@@ -94,10 +88,10 @@ def _check(path: Path, seed: int, repeat_in: Path | None) -> Output:
 @command
 def pareto(
     *,
-    against: Annotated[str, Option(help="dbm_y_mean or dbm_x_mean [m], or speed [m/s].")] = "dbm_y_mean",
-    points: Annotated[int, Option(min=5, max=10000, help="Points of the front.")] = 40,
-    starts: Annotated[int, Option(min=1, max=100000, help="Random starts at every third point.")] = 5,
-    search: Annotated[list[str] | None, Option(metavar="NAME=BUDGET,BUDGET", show_default=False, help=SEARCHES)] = None,
+    against: str = "dbm_y_mean",
+    points: Annotated[int, Option(min=5, max=10000)] = 40,
+    starts: Annotated[int, Option(min=1, max=100000)] = 5,
+    search: Annotated[list[str] | None, Option(metavar="NAME=BUDGET,BUDGET", show_default=False)] = None,
     runs: options.Runs = 11,
     seed: options.Seed = 0,
     problem: options.NamedProblem,
@@ -116,7 +110,7 @@ def prices(
     *,
     starts: options.Starts = 10,
     seed: options.Seed = 0,
-    checks: Annotated[int, Option(min=0, help="Quantities of the robot that are verified by solving again.")] = 3,
+    checks: Annotated[int, Option(min=0)] = 3,
     problem: options.NamedProblem,
     out: options.OutFolder = options.RESULTS,
 ) -> Output:
@@ -130,11 +124,11 @@ def prices(
 @command
 def sweep(
     *,
-    over: Annotated[list[str], Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")],
+    over: Annotated[list[str], Option(metavar="NAME=LOW:HIGH:COUNT")],
     starts: options.Starts = 5,
     seed: options.Seed = 0,
-    engine: Annotated[bool, Option("--engine", help=ENGINE)] = False,
-    steps: Annotated[int, Option(min=1, max=1000, help="With --engine: number of steps.")] = 10,
+    engine: Annotated[bool, Option("--engine")] = False,
+    steps: Annotated[int, Option(min=1, max=1000)] = 10,
     problem: options.NamedProblem,
     out: options.OutFolder = options.RESULTS,
 ) -> Output:
@@ -156,12 +150,12 @@ def sweep(
 @command
 def tune(
     *,
-    over: Annotated[list[str] | None, Option(metavar="NAME=LOW:HIGH:COUNT", help=TUNED_LIMITS)] = None,
-    algorithms: Annotated[str, Option(help="Searches, separated by commas.")] = "cma,pso,ga",
-    simulations: Annotated[int, Option(min=10, max=10**6, help="Of each search.")] = 300,
+    over: Annotated[list[str] | None, Option(metavar="NAME=LOW:HIGH:COUNT")] = None,
+    algorithms: str = "cma,pso,ga",
+    simulations: Annotated[int, Option(min=10, max=10**6)] = 300,
     runs: options.Runs = 3,
     seed: options.Seed = 0,
-    steps: Annotated[int, Option(min=1, max=1000, help="Of a cycle, that a search simulates.")] = 4,
+    steps: Annotated[int, Option(min=1, max=1000)] = 4,
     problem: options.NamedProblem,
     world: ConditionOptions,
     drive_options: DriveOptions,

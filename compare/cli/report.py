@@ -14,26 +14,17 @@ from compare.report import FurtherFiles, renew_report, watch_report
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
 
-CSV = "Write all runs and all judged points as CSV files too."
-LATEX = "Also write tables for papers: of each problem, and of all problems and solvers (LaTeX, package booktabs)."
-DIGITS = "Decimals of objectives in these tables (default: as many as different medians need to differ)."
-FIGURES = "Also write all figures as PNG and, for papers, as PDF, with captions in figures.tex."
-WATCH = "Rewrite the report while the study runs; the open page reloads itself."
-OUT = "Folder for the report, its tables and figures; results stored in it are used again."
-QUICK = "The least work that fills every table and figure, instead of the paper's."
-EFFORT = "JSON file with other settings, as `settings` of `summary.json`; the rest are the paper's."
-
 
 @command
 def report(
     *,
-    folder: Annotated[Path, Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
-    latex: Annotated[bool, Option("--latex", help=LATEX)] = False,
-    digits: Annotated[int | None, Option(min=0, max=15, help=DIGITS)] = None,
-    figures: Annotated[bool, Option("--figures", help=FIGURES)] = False,
+    folder: Annotated[Path, Argument(metavar="DIR")],
+    latex: Annotated[bool, Option("--latex")] = False,
+    digits: Annotated[int | None, Option(min=0, max=15)] = None,
+    figures: Annotated[bool, Option("--figures")] = False,
     code: Code = None,
-    csv: Annotated[bool, Option("--csv", help=CSV)] = False,
-    watch: Annotated[bool, Option("--watch", help=WATCH)] = False,
+    csv: Annotated[bool, Option("--csv")] = False,
+    watch: Annotated[bool, Option("--watch")] = False,
 ) -> Output:
     """Rewrite a study's report from all records of its folder, without running a solver.
 
@@ -56,9 +47,9 @@ def report(
 @command
 def reproduce(
     paper: Annotated[str, Argument(metavar="PAPER", help=f"{', '.join(REPRODUCTIONS)}, or FILE.py of your own")],
-    out: Annotated[Path, Option(help=OUT), OUTPUT],
-    quick: Annotated[bool, Option("--quick", help=QUICK)] = False,
-    effort: Annotated[Path | None, Option(help=EFFORT)] = None,
+    out: Annotated[Path, OUTPUT],
+    quick: Annotated[bool, Option("--quick")] = False,
+    effort: Path | None = None,
     scheduler: Scheduler = None,
 ) -> Output:
     """Recompute a paper's tables and figures next to the printed ones, and check its claims.

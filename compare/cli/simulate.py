@@ -27,27 +27,14 @@ if TYPE_CHECKING:
     from nlp_gait.simulation.plan import Plan
     from nlp_gait.simulation.simulate import Conditions, Push, Simulation, SimulationRun
 
-DRIVE = (
-    "feed-forward: set-points every 10 ms, linear between them, planned velocity and torque fed forward. held: each held for "
-    "40 ms, nothing fed forward. Or a file with settings of drive and feedback."
-)
-TORQUES = "urdf, stall or continuous: published limits differ; joints without motor data have the file's."
-FEEDBACK = (
-    "balance: footholds, times of steps and torques by the measured state (extra sim), the default of walks from rest to rest; "
-    "none: open loop, the default of phases and cycles."
-)
-SLOPE = "Rise of the floor forward and to the left, added to the slope of a walk planned for one; each below 45."
-LIVE = "Show it in MuJoCo's viewer in real time; arrow keys push the robot forward, backward, to the left and to the right."
-PUSH = "Impulse on the torso, forward and to the left [N s], and its begin [s] (default: in the middle)."
-
 
 @dataclass(frozen=True, kw_only=True)
 class DriveOptions:
     """The drive of the simulated robot."""
 
-    drive: Annotated[str, Option(metavar="NAME|FILE.toml", help=DRIVE)] = "feed-forward"
-    torque_limits: Annotated[str | None, Option(help=TORQUES)] = None
-    feedback: Annotated[str | None, Option(help=FEEDBACK)] = None
+    drive: Annotated[str, Option(metavar="NAME|FILE.toml")] = "feed-forward"
+    torque_limits: str | None = None
+    feedback: str | None = None
 
     def make(self, plan: Plan) -> Drive:
         """Return the drive for a plan; raises UnknownNameError, and InputError for a setting that is not allowed."""
@@ -65,18 +52,12 @@ class DriveOptions:
 class ConditionOptions:
     """Differences of the simulated world and robot from the planned ones."""
 
-    friction: Annotated[
-        float | None, Option(min=1e-3, max=1e3, help="Coefficient of sliding friction (default: 0.7).")
-    ] = None
-    slope_deg: Annotated[str, Option(metavar="X,Y", help=SLOPE)] = "0,0"
-    mass_factor: Annotated[float, Option(min=1e-3, max=1e3, help="On all masses; the gait was planned for 1.")] = 1.0
-    stiffness_factor: Annotated[
-        float, Option(min=1e-3, max=1e3, help="True stiffness of the joints over what their drive assumes.")
-    ] = 1.0
-    push: Annotated[str | None, Option(metavar="X,Y[,S]", help=PUSH)] = None
-    bumps_mm: Annotated[
-        float | None, Option(min=1e-3, max=1e3, help="Tiles of random height on the ground, up to this.")
-    ] = None
+    friction: Annotated[float | None, Option(min=0.001, max=1000.0)] = None
+    slope_deg: Annotated[str, Option(metavar="X,Y")] = "0,0"
+    mass_factor: Annotated[float, Option(min=0.001, max=1000.0)] = 1.0
+    stiffness_factor: Annotated[float, Option(min=0.001, max=1000.0)] = 1.0
+    push: Annotated[str | None, Option(metavar="X,Y[,S]")] = None
+    bumps_mm: Annotated[float | None, Option(min=0.001, max=1000.0)] = None
 
     def make(self) -> Conditions:
         """Return the conditions; raises InputError for a value that is not allowed."""
@@ -106,16 +87,12 @@ class ConditionOptions:
 def simulate(
     stored: StoredGait,
     *,
-    steps: Annotated[
-        int | None, Option(min=1, max=1000, help="Simulate this many steps of a gait that repeats.")
-    ] = None,
-    out: Annotated[Path | None, Option(help="Folder for report, time histories, model and figure."), OUTPUT] = None,
-    page: Annotated[
-        Path | None, Option(metavar="FILE.html", help="Page that plays the simulation in 3-D."), OUTPUT_FILE
-    ] = None,
-    video: Annotated[Path | None, Option(help="Film it to this .gif file; needs OpenGL."), OUTPUT_FILE] = None,
-    live: Annotated[bool, Option("--live", help=LIVE)] = False,
-    sole: Annotated[str, Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
+    steps: Annotated[int | None, Option(min=1, max=1000)] = None,
+    out: Annotated[Path | None, OUTPUT] = None,
+    page: Annotated[Path | None, Option(metavar="FILE.html"), OUTPUT_FILE] = None,
+    video: Annotated[Path | None, OUTPUT_FILE] = None,
+    live: Annotated[bool, Option("--live")] = False,
+    sole: str = "rectangle",
     world: ConditionOptions,
     drive_options: DriveOptions,
 ) -> Output:

@@ -27,11 +27,6 @@ from nlp_gait.proofs.guarantee import guarantee
 
 SHOWN_MARGINS = 4
 SHOWN_VARIABLES, SHOWN_ROWS = 12, 20  # of a solution; both tables together have no more than the second number
-LINEAR_SOLVER = "Linear solver of IPOPT, for example ma57 if its library is installed (default: mumps)."
-SPEEDS = "Speeds > 0 of the inner steps [m/s], separated by commas; between them it changes evenly."
-TURN = "Turn to the left along an arc, by 15 degrees with each step unless --steps; negative turns to the right."
-FOOTHOLDS = "CSV file with columns x_m,y_m,z_m,yaw_deg: where the right foot, the left foot and so on land."
-OF_A_WALK = "intervals (of each phase), or a parameter or bound of nao-walk or humanoid-walk; repeatable."
 
 
 MARGINS = (
@@ -43,18 +38,15 @@ MARGINS = (
 @command
 def solve(
     *,
-    starts: Annotated[
-        int | None,
-        Option(min=1, max=100000, help="Random starts within the bounds (default: 20, fewer for slow problems)."),
-    ] = None,
+    starts: Annotated[int | None, Option(min=1, max=100000)] = None,
     seed: options.Seed = 0,
-    x0: Annotated[str | None, Option("--x0", help="First start: values separated by commas.")] = None,
+    x0: Annotated[str | None, Option("--x0")] = None,
     problem: options.NamedProblem,
-    solver: Annotated[str, Option(help="NLP solver; see nlp-gait list.")] = "ipopt",
-    linear_solver: Annotated[str | None, Option(help=LINEAR_SOLVER)] = None,
+    solver: str = "ipopt",
+    linear_solver: str | None = None,
     jobs: options.Jobs = None,
-    show_all: Annotated[bool, Option("--all", help="Print all variables and active constraints.")] = False,
-    out: Annotated[Path | None, Option(help="Write the solution to this JSON file."), OUTPUT_FILE] = None,
+    show_all: Annotated[bool, Option("--all")] = False,
+    out: Annotated[Path | None, OUTPUT_FILE] = None,
 ) -> Output:
     """Solve a problem with an NLP solver from several random starts; the exact functions judge the best.
 
@@ -143,23 +135,14 @@ def _describe(solution: Solution, show_all: bool) -> Iterator[str | Rows]:
 class RouteOptions:
     """Where a walk leads, and how fast."""
 
-    steps: Annotated[
-        int | None,
-        Option(min=2, max=1000, help="Swings of a foot, both half steps included (default: 10, or by distance)."),
-    ] = None
-    speed: Annotated[
-        float | None, Option(min=1e-3, max=1e3, help="Speed of the inner steps [m/s] (default: the cheapest).")
-    ] = None
-    speeds: Annotated[str, Option(help=SPEEDS)] = ""
-    distance: Annotated[float | None, Option(min=1e-3, max=1e6, help="Distance that the feet advance [m].")] = None
-    slope_deg: Annotated[
-        float, Option(min=-45.0, max=45.0, help="By which the ground rises forward; negative falls.")
-    ] = 0.0
-    stairs: Annotated[
-        str, Option(metavar="RISExRUN:N", help="Climb N treads of this rise and depth [m], one with each step.")
-    ] = ""
-    turn_deg: Annotated[float, Option(min=-36000.0, max=36000.0, help=TURN)] = 0.0
-    footholds: Annotated[Path | None, Option(help=FOOTHOLDS)] = None
+    steps: Annotated[int | None, Option(min=2, max=1000)] = None
+    speed: Annotated[float | None, Option(min=0.001, max=1000.0)] = None
+    speeds: str = ""
+    distance: Annotated[float | None, Option(min=0.001, max=1000000.0)] = None
+    slope_deg: Annotated[float, Option(min=-45.0, max=45.0)] = 0.0
+    stairs: Annotated[str, Option(metavar="RISExRUN:N")] = ""
+    turn_deg: Annotated[float, Option(min=-36000.0, max=36000.0)] = 0.0
+    footholds: Path | None = None
 
     def plan(self, robot: str, settings: WalkSettings) -> WalkPlan:
         """Return the walk of a robot; raises as ``plan_walk``."""
@@ -192,13 +175,13 @@ class RouteOptions:
 @command
 def plan(
     *,
-    robot: Annotated[str, Option(help=options.ROBOT)] = "nao-v5",
+    robot: str = "nao-v5",
     route: RouteOptions,
     margins: Annotated[str | None, Option(metavar="ALONG,ACROSS", help=MARGINS)] = None,
-    values: Annotated[list[str] | None, Option("--set", metavar="NAME=VALUE", help=OF_A_WALK)] = None,
+    values: Annotated[list[str] | None, Option("--set", metavar="NAME=VALUE")] = None,
     limits: options.Limits = None,
-    starts: Annotated[int, Option(min=1, max=100, help="Most start points, until one converges.")] = 3,
-    out: Annotated[Path | None, Option(help="Write the plan to this JSON file."), OUTPUT_FILE] = None,
+    starts: Annotated[int, Option(min=1, max=100)] = 3,
+    out: Annotated[Path | None, OUTPUT_FILE] = None,
 ) -> Output:
     """Plan a whole walk from standing to standing: weight shift, half step, steps, half step, weight shift.
 

@@ -77,6 +77,7 @@ REFUSED = {
     "import walk12 {new}/none.csv --as ga": "cannot be read",
     "verify {new}/missing.zip": "missing.zip' cannot be read: No such file",
     "prices nao-spp --out {new}": "unknown problem 'nao-spp'",
+    "tune nao-cycle --algorithms psso --out {new}": "unknown algorithm 'psso'",
     "certainty nao-spp --out {new}": "unknown problem 'nao-spp'",
 }
 
