@@ -12,12 +12,4 @@ from nlp_gait.gaitbench.facts import Definition, Evidence, list_instances
 from nlp_gait.gaitbench.generated import list_families
 from nlp_gait.gaitbench.instance import Instance, generate, load
 
-__all__ = [
-    "Definition",
-    "Evidence",
-    "Instance",
-    "generate",
-    "list_families",
-    "list_instances",
-    "load",
-]
+__all__ = ["Definition", "Evidence", "Instance", "generate", "list_families", "list_instances", "load"]

@@ -18,14 +18,11 @@ from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe, find_shipped_facts
 from nlp_gait.gaitbench.generated import STARTS, is_generated, parse_id
 
-AGREEMENT = (
-    1e-9  # of values that identify an instance, in units of a row's scale, or of their size where that is larger
-)
+# Of values that identify an instance, in units of a row's scale, or of their size where that is larger.
+AGREEMENT = 1e-9
 SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
 # Slack of the best known point in every row, in units of its scale: no machine's rounding makes it infeasible.
 SLACK = 1e-10
-# Where the objective exceeds this, joints almost cannot reach, and rounding is amplified so much that these digits agree.
-AMPLIFIED, AMPLIFIED_AGREEMENT = 1e15, 1e-7
 MOST_ROUNDS = 4  # of the starts, until one of them converges
 
 
@@ -138,8 +135,7 @@ def check_shipped_facts(instance: Judged) -> None:
     for number, probe in enumerate(() if facts is None else facts.probes, 1):
         now = asdict(_make_probe(instance, np.array(probe.x)))
         for name, before in asdict(probe).items():
-            agreement = AGREEMENT if abs(probe.objective) < AMPLIFIED else AMPLIFIED_AGREEMENT
-            if name != "x" and not abs(now[name] - before) <= agreement * max(1.0, abs(before)):
+            if name != "x" and not abs(now[name] - before) <= AGREEMENT * max(1.0, abs(before)):
                 raise InputError(
                     f"{instance.id} has changed: {name} at probe {number} is {now[name]:.10g}, not {before:.10g}; its best known "
                     "point and its evidence are not used"

@@ -1,11 +1,11 @@
 """Instances in the form that optimisers' packages take; each package is imported when it is needed."""
 
 from collections.abc import Callable
-from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
 from nlp_gait.errors import MissingExtraError, check_name, unknown
+from nlp_gait.providers import import_object
 
 # The function that converts an instance, and the packages that it needs.
 ADAPTERS: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -29,6 +29,5 @@ def find_adapter(name: str) -> Callable[..., Any]:
                 f"to({name!r}) needs the package {package}, which is not installed: pip install {package}, or all adapters' "
                 "packages: pip install 'nlp-gait[algorithms]'"
             )
-    module, _, function = address.partition(":")
-    adapter: Callable[..., Any] = getattr(import_module(f"{__name__}.{module}"), function)
+    adapter: Callable[..., Any] = import_object(f"{__name__}.{address}")
     return adapter
