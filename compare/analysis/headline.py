@@ -1,5 +1,6 @@
 """A study in sentences: its answer for each problem or over many, also while it runs, and what is missing in it."""
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -90,13 +91,16 @@ def _describe_away(comparison: Comparison, away: Sequence[tuple[SolverRuns, floa
     which = "median" if len(first.records) > 1 else "only"
     distance = f"{_format_distance(comparison, gap)} {_name_reference(comparison)}"
     words = [f"The {which} {first.title} run ends {distance}"]
-    before = first
-    for solver, gap in others:
-        word = f"{solver.title} {comparison.format_gap(abs(gap))}"
-        same = comparison.compare_with_others(before.name).get(solver.name) == 0
-        words.append(f"{word} (order uncertain)" if same else word)
-        before = solver
-    return ", ".join(words)
+    doubts = _list_doubts(comparison, [solver for solver, _ in away])
+    words += [f"{solver.title} {comparison.format_gap(abs(gap))}" for solver, gap in others]
+    marks = [" (order uncertain)" if a and not b else "" for a, b in itertools.pairwise([False, *doubts, False])]
+    return ", ".join(f"{word}{mark}" for word, mark in zip(words, marks, strict=True))
+
+
+def _list_doubts(comparison: Comparison, solvers: Sequence[SolverRuns]) -> list[bool]:
+    """Return for each neighbour of a solver whether a test finds no difference between them."""
+    pairs = itertools.pairwise(solvers)
+    return [comparison.compare_with_others(a.name).get(b.name) == 0 for a, b in pairs]
 
 
 def _count_reaching(comparison: Comparison, solver: SolverRuns) -> str:

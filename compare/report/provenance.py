@@ -12,8 +12,7 @@ GLOSSARY = {
     "run": "one solver with one seed; a start of a gradient method is a run",
     "gap": "distance from the best known value, relative to it",
     "reached": "a gap of at most 1e-6, which is 0.0001 %",
-    "feasible": "satisfies all constraints at the problem's samples, within the judge's tolerance",
-    "guaranteed": "proven to satisfy all limits at every instant",
+    "feasible": "satisfies all constraints of the problem within the judge's tolerance",
     "evaluations": "equivalent ones: the objective with all constraints at one point counts 1; for n variables a gradient or "
     "a Jacobian counts n + 1, a Hessian (n + 1)(n + 2)/2, like finite differences",
     "constraint": "one value between a lower and an upper bound; the bounds of the variables are not counted",

@@ -99,7 +99,7 @@ def make_study_document(
             make_folded_section("Cost to targets", comparisons, list_costs),
             make_folded_section("Significance", comparisons, list_tests, TESTS),
             make_folded_section(
-                "Optimum: active constraints, prices, gaits",
+                "Optimum: active constraints, prices" + (", gaits" if any(gaits.values()) else ""),
                 comparisons,
                 lambda c: list_optimum(c, gaits[c.problem]),
             ),
@@ -112,7 +112,7 @@ def _write_title(titles: Sequence[tuple[str, str]], solvers: int) -> str:
     """Return the task and the objective, or what several problems have in common."""
     goals = {goal for _, goal in titles}
     if len(titles) == 1:
-        return ": ".join(titles[0])
+        return ": ".join(dict.fromkeys(word for word in titles[0] if word != "objective"))
     goal = goals.pop()
     return f"{solvers} solvers on {len(titles)} problems" if goals else f"{goal[:1].upper()}{goal[1:]}"
 
