@@ -17,6 +17,7 @@ from metaheuristics import make_algorithm, minimize
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.solve import solve
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import Bumps
@@ -106,7 +107,11 @@ class Tune(Question[list[ScoredGait]]):
         return [Arena(self.problem, drive=self.drive, conditions=c, steps=steps, settle_s=1.0) for c in worlds]
 
     def find(self, work: Work) -> Iterator[list[ScoredGait]]:
-        """Yield the rows found so far; raises InputError for a problem that cannot be simulated."""
+        """Yield the rows found so far; raises InputError for a problem that is no walk or cycle."""
+        if "energy_J_per_m" not in build_exact_model(self.problem).index_names:
+            raise InputError(
+                f"{self.problem.name} has no energy per metre; tune a walking cycle or a whole walk: nao-cycle"
+            )
         inputs = {**identify_problem(self.problem), "steps": self.steps, "starts": self.starts}
         inputs |= {"drive": asdict(self.drive), "conditions": asdict(self.conditions)}
 
