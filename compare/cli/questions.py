@@ -110,7 +110,6 @@ def prices(
     *,
     starts: options.Starts = 10,
     seed: options.Seed = 0,
-    checks: Annotated[int, Option(min=0)] = 3,
     problem: options.NamedProblem,
     out: options.OutFolder = options.RESULTS,
 ) -> Output:
@@ -118,7 +117,7 @@ def prices(
 
     Derivatives of optimum and x* by the first-order conditions, verified by solving again. Example: `nlp-gait prices nao-ssp`
     """
-    return run_question(Prices(problem=problem.load(), starts=starts, seed=seed, checks=checks), out)
+    return run_question(Prices(problem=problem.load(), starts=starts, seed=seed), out)
 
 
 @command

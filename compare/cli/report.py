@@ -20,7 +20,6 @@ def report(
     *,
     folder: Annotated[Path, Argument(metavar="DIR")],
     latex: Annotated[bool, Option("--latex")] = False,
-    digits: Annotated[int | None, Option(min=0, max=15)] = None,
     figures: Annotated[bool, Option("--figures")] = False,
     code: Code = None,
     csv: Annotated[bool, Option("--csv")] = False,
@@ -39,7 +38,7 @@ def report(
     if watch:
         say(f"open {folder / 'report.html'}; it follows the study in {folder} until Ctrl-C")
         watch_report(folder, lambda: renew_report(folder))
-    further = FurtherFiles(csv=csv, latex=latex or digits is not None, decimals=digits, figures=figures)
+    further = FurtherFiles(csv=csv, latex=latex, figures=figures)
     _, damaged, written = renew_report(folder, further)
     return Output(data={"damaged": damaged}, written=written, failures=damaged)
 

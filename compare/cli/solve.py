@@ -13,7 +13,7 @@ from compare.analysis.best_known import describe_value
 from compare.analysis.units import with_unit
 from compare.cli import options
 from compare.cli.command import OUTPUT_FILE, command, report_interrupts
-from compare.cli.printing import Output, Rows, fail, say, show_progress, tabulate
+from compare.cli.printing import Output, Rows, fail, say, show_progress
 from compare.study.references import find_reference
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.plan_walk import MARGINS as MARGINS_OF_SOLE
@@ -28,7 +28,6 @@ from nlp_gait.proofs.guarantee import guarantee
 SHOWN_MARGINS = 4
 SHOWN_VARIABLES, SHOWN_ROWS = 12, 20  # of a solution; both tables together have no more than the second number
 
-
 MARGINS = (
     f"Least distance of the ZMP from the edges of its support, as shares below 0.5 of a sole's length and width (default: "
     f"{MARGINS_OF_SOLE[0]:g},{MARGINS_OF_SOLE[1]:g}); 0,0 for the cheapest walk."
@@ -40,12 +39,9 @@ def solve(
     *,
     starts: Annotated[int | None, Option(min=1, max=100000)] = None,
     seed: options.Seed = 0,
-    x0: Annotated[str | None, Option("--x0")] = None,
     problem: options.NamedProblem,
     solver: str = "ipopt",
-    linear_solver: str | None = None,
     jobs: options.Jobs = None,
-    show_all: Annotated[bool, Option("--all")] = False,
     out: Annotated[Path | None, OUTPUT_FILE] = None,
 ) -> Output:
     """Solve a problem with an NLP solver from several random starts; the exact functions judge the best.
@@ -53,8 +49,7 @@ def solve(
     Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --set swing_height_m=0.024`
     """
     loaded = problem.load()
-    first = None if x0 is None else loaded.check_x(options.parse_numbers("x", x0, "--x0"))
-    chosen = registry.make_solver(solver, **({} if linear_solver is None else {"linear_solver": linear_solver}))
+    chosen = registry.make_solver(solver)
     starts, stopped = loaded.hints.starts if starts is None else starts, ""
     with (
         report_interrupts("interrupted before there was a result; nothing was written"),
@@ -65,7 +60,6 @@ def solve(
                 loaded,
                 starts=starts,
                 seed=seed,
-                x0=first,
                 solver=chosen,
                 workers=jobs,
                 progress=lambda outcome: advance(f"{outcome.objective:.6g}, {outcome.status}"),
@@ -77,7 +71,7 @@ def solve(
     proven = guarantee(loaded, loaded.check_x(solution.x)) if solution.feasible and loaded.moves else None
     reference = find_reference(identify_problem(loaded))
     data = {**solution.to_json(), "guaranteed": None if proven is None else asdict(proven), **reference.to_json()}
-    parts = [*_describe(solution, show_all)]
+    parts = [*_describe(solution)]
     if proven is not None:
         parts.append(f"Guaranteed: {proven}")
     if solution.feasible and reference.objective is not None:
@@ -95,30 +89,25 @@ def solve(
     return Output(data=data, parts=parts, written=written, failures=failures, interrupted=stopped)
 
 
-def _describe(solution: Solution, show_all: bool) -> Iterator[str | Rows]:
+def _describe(solution: Solution) -> Iterator[str | Rows]:
     problem, best = solution.problem, solution.best
     value = with_unit(solution.objective, problem.objective.unit)
     words = f"{problem.objective.name} {value}" if solution.feasible else "no feasible point was found"
     yield f"{problem.address}: {words} ({solution.status})"
     kind = "Optimum" if solution.converged else "Best feasible point" if solution.feasible else "Least infeasible point"
     x, active = list(solution.x.items()), solution.active_constraints
-    if not show_all and len(x) > SHOWN_VARIABLES:
+    if len(x) > SHOWN_VARIABLES:
         order = np.argsort(-np.abs(best.x) / problem.scale, kind="stable")[:SHOWN_VARIABLES]
         x, kind = [x[i] for i in order], f"{kind}: the largest variables in units of their ranges"
-    shown = active if show_all else active[: SHOWN_ROWS - len(x)]
+    shown = active[: SHOWN_ROWS - len(x)]
     units = {variable.name: variable.unit for variable in problem.variables}
     yield Rows(kind, ("variable", "value"), [(name, with_unit(value, units[name], ".6g")) for name, value in x])
-    if active:
-        columns = {
-            "bound": lambda a: a.name,
-            "side": lambda a: a.side,
-            "at": lambda a: with_unit(a.bound, a.unit, "g"),
-            "price": lambda a: f"{a.price:.4g} {a.price_unit}",
-        }
-        yield tabulate("Active constraints, dearest first", shown, columns)
+    rows = [(a.name, a.side, with_unit(a.bound, a.unit, "g"), f"{a.price:.4g} {a.price_unit}") for a in shown]
+    if rows:
+        yield Rows("Active constraints, dearest first", ("bound", "side", "at", "price"), rows)
     hidden = len(solution.x) - len(x), len(active) - len(shown)
     if any(hidden):
-        yield f"and {hidden[0]:,} more variables and {hidden[1]:,} more active constraints: --all"
+        yield f"and {hidden[0]:,} more variables and {hidden[1]:,} more active constraints: --out FILE or --json"
     counts, time = solution.evaluations, solution.time_s
     yield (
         f"{sum(start.converged for start in solution.starts)} of {len(solution.starts)} starts converged; "

@@ -45,6 +45,7 @@ MASS_DIFFERENCE, LENGTH_DIFFERENCE_M = 1e-3, 1e-4
 # A limit whose natural step changes the optimum by less than this share costs nothing.
 FREE = 1e-9
 SHOWN = 10  # bars of each kind
+VERIFIED = 3  # quantities of the robot with the largest changes that are solved again
 LISTED = 12  # rows of the robot's table; the CSV file has all
 UP, DOWN = "#D55E00", "#0072B2"
 # Unit and scale in which most bars are small numbers.
@@ -225,8 +226,6 @@ class Prices(Question[FoundPrices]):
 
     starts: int = 10  #: random starts
     seed: int = 0  #: of the starts
-    #: how many of the robot's quantities, largest change first, are verified by solving again; all parameters are
-    checks: int = 3
     solver: Solver | None = None  #: one with multipliers; its optimum is refined by IPOPT
 
     def find(self, work: Work) -> Iterator[FoundPrices]:
@@ -261,7 +260,7 @@ class Prices(Question[FoundPrices]):
             x=problem.by_name(optimum.x),
             limits=tuple(verify(price, change_parameter) for price in limits),
             free=len(parameters) - len(limits),
-            robot=(*(verify(price, change_robot) for price in robot[: self.checks]), *robot[self.checks :]),
+            robot=(*(verify(price, change_robot) for price in robot[:VERIFIED]), *robot[VERIFIED:]),
             weak=optimum.weak,
             dependent=optimum.dependent,
             residual=optimum.residual,

@@ -68,9 +68,9 @@ class ComparedStudy:
         with share_looks({name_solver(record.solver) for record in self.records}):
             return plot_charts(make_final_gap_charts(self._find(problem)))
 
-    def latex(self, decimals: int | None = None) -> str:
+    def latex(self) -> str:
         """Return a table of each problem, and of several problems and all solvers, see ``compare.report.latex``."""
-        tables = [format_latex_table(comparison, decimals) for comparison in self.comparisons]
+        tables = [format_latex_table(comparison) for comparison in self.comparisons]
         return "\n".join([*tables, *([format_latex_overview(self.comparisons)] if len(tables) > 1 else [])])
 
     def report(self, folder: Path | str) -> Path:

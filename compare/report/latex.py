@@ -21,12 +21,12 @@ MARK = re.compile(r" ([-+=])$")
 LEAST_DECIMALS, MOST_DECIMALS = 4, 10
 
 
-def format_latex_table(comparison: Comparison, decimals: int | None = None) -> str:
+def format_latex_table(comparison: Comparison) -> str:
     """Return the table of one problem: a row for each solver, the best median over all runs first.
 
-    Objectives have so many decimals, or else as many as different medians need to differ.
+    Objectives have as many decimals as different medians need to differ.
     """
-    decimals = _choose_decimals(comparison) if decimals is None else decimals
+    decimals = _choose_decimals(comparison)
     first = comparison.solvers[0]
     p_values = {pair.second: pair.rank_sum for pair in comparison.pairs if pair.first == first.name}
     is_best = bool(p_values) and all(p < SIGNIFICANT for p in p_values.values())

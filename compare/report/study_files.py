@@ -27,7 +27,6 @@ class FurtherFiles:
 
     csv: bool = False  #: all runs, and the points of each problem; written again, too, where they exist already
     latex: bool = False  #: a table of each problem, and one of several problems and all solvers
-    decimals: int | None = None  #: of objectives in these tables; None for as many as medians need to differ
     figures: bool = False  #: all figures of the report as PNG and as PDF, with their captions in LaTeX
 
     def write(self, folder: Path, comparisons: Sequence[Comparison], document: Document) -> list[Path]:
@@ -43,7 +42,7 @@ class FurtherFiles:
             written += [save_figure(plot, folder / f"{name}.{kind}") for name, plot in plots for kind in ("png", "pdf")]
             written.append(write_text(folder / "figures.tex", _write_captions(figures, comparisons)))
         if self.latex:
-            latex = {make_file_name(c.problem): format_latex_table(c, self.decimals) for c in comparisons}
+            latex = {make_file_name(c.problem): format_latex_table(c) for c in comparisons}
             latex |= {"problems": format_latex_overview(comparisons)} if len(comparisons) > 1 else {}
             written += [write_text(folder / f"{name}-table.tex", table) for name, table in latex.items()]
         return written

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from compare.cli import PANELS, load_command
+from compare.cli.command import read_help
 from tests.compare.cli.calls import is_one_sentence, nlp_gait, one_sentence, process
 from tests.compare.records import DSP_X
 
@@ -96,6 +97,13 @@ def test_help_has_an_example_and_the_text_and_limits_of_each_option(name: str) -
         kind = option.type_descriptor.annotation
         assert kind not in (int, float) or option.min is not None, option.name
         assert kind is not float or option.max is not None, option.name
+
+
+def test_each_text_of_the_help_has_its_option() -> None:
+    places = {place.split(":")[1]: name for commands in PANELS.values() for name, (place, _) in commands.items()}
+    for function, texts in read_help().items():
+        commands = COMMANDS.values() if function == "shared" else [COMMANDS[places[function]]]
+        assert texts.keys() <= {option.name for command in commands for option in command.params}, function
 
 
 @each_command
