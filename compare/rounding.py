@@ -130,12 +130,15 @@ def evaluate_rounded(problem: GaitProblem, printed: Sequence[str], claimed: str 
 def find_feasible(problem: GaitProblem, printed: Sequence[str]) -> Array | None:
     """Return the point (n,) nearest to the printed one that rounds to it and is feasible; None if no point that is tried is.
 
-    Points with more than ``FEW_DIGITS`` digits stand for themselves. Raises InputError for texts that are not finite numbers.
+    All numbers have as many significant digits as the longest one: programs leave zeros at the end out. Points with more than
+    ``FEW_DIGITS`` digits stand for themselves.
     """
     x, model = np.array([float(text) for text in printed]), build_exact_model(problem)
-    if max(len(Decimal(text.strip()).as_tuple().digits) for text in printed) > FEW_DIGITS:
+    digits = max(len(Decimal(text.strip()).as_tuple().digits) for text in printed)
+    if digits > FEW_DIGITS:
         return None
-    box = np.array([_read_interval(name, text) for name, text in zip(problem.names, printed, strict=True)])
+    half = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(np.abs(x), np.finfo(float).tiny))) + 1 - digits)
+    box = np.stack([x - half, x + half], axis=-1)
     rng = np.random.default_rng(0)
     places = np.concatenate([rng.uniform(size=(SAMPLES, len(x))), rng.integers(2, size=(SAMPLES, len(x)))])
     points = np.clip(box[:, 0] + places * np.diff(box)[:, 0], problem.lower, problem.upper)
