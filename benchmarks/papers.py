@@ -13,7 +13,7 @@ RECORDS = Path(__file__).parents[1] / "docs" / "papers"
 
 
 def main() -> None:
-    """Run, and copy ``summary.json`` and the figure."""
+    """Run, and copy ``summary.json`` and the figures."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.papers", description=__doc__.splitlines()[0])
     parser.add_argument("paper", choices=REPRODUCTIONS)
     parser.add_argument("--quick", action="store_true", help="without runs of the searches")
@@ -24,8 +24,11 @@ def main() -> None:
     command = f"python -m benchmarks.papers {arguments.paper}{' --quick' if arguments.quick else ''}"
     paper.reproduce(Runner(folder=arguments.out, progress=lambda line: print(line, flush=True)), effort, command)
     shutil.copy(arguments.out / "summary.json", RECORDS / f"{arguments.paper}.json")
+    figures = RECORDS / arguments.paper
+    shutil.rmtree(figures, ignore_errors=True)
+    figures.mkdir()
     for figure in arguments.out.glob("*.svg"):
-        shutil.copy(figure, RECORDS / f"{arguments.paper}.svg")
+        shutil.copy(figure, figures)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import numpy as np
 from your_own_problem import walker
 
 from compare.analysis.record_statistics import approximate_rank_sum
-from compare.papers.paper import Paper, count_verdicts, read_book
+from compare.papers.paper import Paper, read_book
 from compare.papers.paper_runs import Effort, Runner, choose_best, evaluate_point, make_search_tasks, make_start_tasks
 from compare.papers.rules import Found
 from compare.report.document import Figure
@@ -82,5 +82,5 @@ REPRODUCTION = Paper(
 if __name__ == "__main__":
     runner = Runner(folder=Path(tempfile.mkdtemp()), progress=print, jobs=1)
     record = REPRODUCTION.reproduce(runner, REPRODUCTION.quick)
-    print(count_verdicts(record["verdicts"]))
+    print(*record["sentences"], sep="\n")
     figure = plt.gcf()

@@ -10,7 +10,7 @@ from metaheuristics.adapters.cma import CmaEs
 from metaheuristics.adapters.pymoo import MODULES, Pymoo
 from metaheuristics.algorithms.ant_colony import AntColony, AntColonyGrid
 from metaheuristics.algorithms.differential_evolution import DifferentialEvolution, LShade
-from metaheuristics.algorithms.genetic import GeneticAlgorithm
+from metaheuristics.algorithms.genetic import GeneticAlgorithm, GoswamiGeneticAlgorithm
 from metaheuristics.algorithms.particle_swarm import ConstantInertiaSwarm, ParticleSwarm
 from metaheuristics.algorithms.random_search import RandomSearch
 from metaheuristics.constraint_handling import Deb, EpsilonLevel, StaticPenalty
@@ -25,6 +25,7 @@ ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = {
     "pso": ParticleSwarm,
     "pso-constant": ConstantInertiaSwarm,
     "ga": GeneticAlgorithm,
+    "ga-goswami": GoswamiGeneticAlgorithm,
     "aco": AntColony,
     "aco-grid": AntColonyGrid,
     "de": DifferentialEvolution,

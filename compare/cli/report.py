@@ -68,7 +68,9 @@ def reproduce(
     try:
         with show_progress(paper, None) as advance:
             runner = Runner(folder=out, progress=advance, scheduler=scheduler)
-            reproduction.reproduce(runner, chosen, describe_command())
+            record = reproduction.reproduce(runner, chosen, describe_command())
     except KeyboardInterrupt:
         return Output(data={}, interrupted=f"interrupted; {describe_stored(out)}")
-    return Output(data={"paper": paper}, written=[out / "report.md"])
+    for sentence in record["sentences"]:
+        say(sentence.replace("**", ""))
+    return Output(data={"paper": paper, "sentences": record["sentences"]}, written=[out / "report.html"])

@@ -27,6 +27,7 @@ COLOURS = {
     "pso": "#0072B2",
     "pso-constant": "#56B4E9",
     "ga": "#D55E00",
+    "ga-goswami": "#D55E00",
     "aco": "#009E73",
     "aco-grid": "#CC79A7",
     "cma": "#E69F00",

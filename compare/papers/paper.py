@@ -14,8 +14,9 @@ cannot be tested, and printed tables. The effect of a difference is a text in it
     id,where,printed,here,option,effect
     gravity,(19),z'' - g with g = -9.8,z'' + 9.8,zmp_gravity=printed,
 
-The page shows headlines, then what ``show`` returns and the notes; claims and differences are folded, those first whose verdict
-depends on the reading. The literal reading decides.
+The literal reading decides, or the next one if the print excludes it. Another reading that differs in a choice which the paper
+does not print, see ``Paper.choices``, makes a result that it changes depend on that choice. The page shows the citation, three
+sentences, the headlines and what ``show`` returns; notes, claims and differences are folded.
 """
 
 from __future__ import annotations
@@ -31,16 +32,18 @@ from typing import Any, Generic, TypeVar
 from compare.analysis.best_known import compute_gap
 from compare.analysis.record_statistics import find_best_known
 from compare.analysis.units import format_percent, with_unit
-from compare.drawing.figures import use_style
+from compare.drawing.gait_figure import draw_gaits, prepare_gait
 from compare.papers.paper_runs import Effort, Runner, tabulate, tabulate_runs
-from compare.papers.rules import ClaimRow, Found, Ruling, decide, describe
+from compare.papers.rules import ClaimRow, Judgement, Ruling, compare_alternatives, judge
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, make_text_table
+from compare.report.interactive import describe_gaits
 from compare.report.provenance import TERMS, format_settings, make_solver_table
 from compare.report.writing import make_citation_section, make_own_version_table, write_document
 from compare.study.record import RunRecord, format_now, group_by, list_versions
 from compare.study.references import find_reference
 from nlp_gait.backends.identity import hash_json, make_key
 from nlp_gait.files import make_writable_folder, write_json
+from nlp_gait.formulation import GaitProblem, Result
 
 E = TypeVar("E", bound=Effort)
 R = TypeVar("R")
@@ -79,14 +82,6 @@ def _parse(text: str) -> str | int | float | bool:
     return text
 
 
-@dataclass(frozen=True, slots=True)
-class Judgement:
-    """The verdict on a claim in one reading, and our numbers."""
-
-    verdict: Ruling
-    here: str = ""
-
-
 @dataclass(frozen=True)
 class Book:
     """Claims and differences of a paper, and the functions that compute their numbers."""
@@ -102,8 +97,8 @@ class Book:
         """Name the functions that return the numbers of claims, by id, or the effects of differences.
 
         Args:
-            functions: of a claim from the results of one reading, to values, ``Found``, or None without a feasible result; of a
-                difference from the results of all readings, to words, or numbers by name.
+            functions: of a claim from the results of one reading, to values, ``Found``, ``Alternatives``, or None without a
+                feasible result; of a difference from the results of all readings, to words, or numbers by name.
             runs: they need runs of searches, which a quick run leaves out.
         """
         for id, function in functions.items():
@@ -122,7 +117,8 @@ class Book:
     def notes(self) -> list[Part]:
         """Paragraphs of ``notes.md`` beside the module."""
         file = self.folder / "notes.md"
-        return [Prose(file.read_text(encoding="utf-8"))] if file.exists() else []
+        words = file.read_text(encoding="utf-8") if file.exists() else ""
+        return [Section(title="What is not judged, and why", parts=(Prose(words),), folded=True)] if words else []
 
 
 def read_book(module: str) -> Book:
@@ -142,19 +138,35 @@ def read_rows(file: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(file.read_text(encoding="utf-8").splitlines(), strict=True))
 
 
+@dataclass(frozen=True, slots=True)
+class Decided:
+    """Results on all claims."""
+
+    judged: Mapping[str, Mapping[str, Judgement]]  # by claim and reading
+    excluded: Mapping[str, str]  # readings, with the reason
+    overall: Mapping[str, Judgement]  # by claim
+
+
 @dataclass(frozen=True, kw_only=True)
 class Paper(Generic[E, R]):
     """How a paper is reproduced. E is its effort, R the results of one reading."""
 
     book: Book
     title: str
+    citation: str = ""
     full: E
     quick: E  # without runs
     readings: Mapping[str, str]  # label to a sentence; the literal one is first
     run_readings: Mapping[str, str] = field(default_factory=dict)  # of the claims on runs; empty: the same
+    choices: Mapping[str, str] = field(
+        default_factory=dict
+    )  # label of a reading to the unprinted choice that it varies
+    exclude: Callable[[Mapping[str, R]], Mapping[str, str]] = (
+        lambda results: {}
+    )  # readings to why the print excludes them
     compute: Callable[[Runner, E], Mapping[str, R]]
     headlines: Sequence[str]  # ids of claims
-    show: Callable[[Mapping[str, R]], Sequence[Part]] = lambda results: ()  # sentences, tables and a figure
+    show: Callable[[Mapping[str, R]], Sequence[Part]] = lambda results: ()  # figures, sentences and tables
 
     def __post_init__(self) -> None:
         self.book.check()
@@ -167,7 +179,7 @@ class Paper(Generic[E, R]):
         return self.book.name
 
     def reproduce(self, runner: Runner, effort: E, command: str = "python") -> dict[str, Any]:
-        """Write the report (HTML, Markdown), tables (CSV) and the figure to the runner's folder, and return ``summary.json``.
+        """Write the report (HTML, Markdown), tables (CSV) and figures to the runner's folder, and return ``summary.json``.
 
         Results that an earlier call has stored in the folder are reused. The report names the command.
 
@@ -176,16 +188,19 @@ class Paper(Generic[E, R]):
         """
         folder = make_writable_folder(runner.folder)
         results = self.compute(runner, effort)
-        runner.progress("figure, tables and report")
-        judged = self.judge(results, effort)
+        runner.progress("figures, tables and report")
+        judged, excluded = self.judge(results, effort), self.exclude(results)
+        decided = Decided(judged, excluded, {id: self.combine(row, excluded) for id, row in judged.items()})
+        sentences = self.conclude(decided.overall)
         label = "full" if effort == self.full else "quick" if effort == self.quick else "reduced"
-        parts = self._make_parts(results, judged, effort, runner)
-        verdicts = {id: {name: str(one.verdict) for name, one in row.items()} for id, row in judged.items()}
+        parts = self._make_parts(results, decided, effort, runner)
         record = {
             "effort": label,
             "settings": {k: v for k, v in asdict(effort).items() if v != getattr(self.full, k)},
             "made": {"command": command, "date": format_now(), **list_versions()},
-            "verdicts": verdicts,
+            "sentences": sentences,
+            "results": {id: str(one.verdict) for id, one in decided.overall.items()},
+            "verdicts": {id: {name: str(one.verdict) for name, one in row.items()} for id, row in judged.items()},
             "parts": [encode_part(part) for part in parts],
         }
         write_json(folder / "summary.json", record)
@@ -195,19 +210,45 @@ class Paper(Generic[E, R]):
         ending = Section(
             title="Versions, machine, seeds and settings",
             parts=(*origin, make_own_version_table(command)),
+            folded=True,
         )
         cited = make_citation_section(record.inputs.problem for record in runner.records)
         title = self.title if label == "full" else f"{self.title} ({label})"
-        headline = [count_verdicts(verdicts)]
-        write_document(folder, Document(title=title, headline=headline, parts=(*parts, ending, cited)))
+        opening = Prose("\n\n".join([self.citation, *sentences]).strip())
+        write_document(folder, Document(title=title, parts=(opening, *parts, ending, cited)))
         return record
 
     def judge(self, results: Mapping[str, R], effort: E) -> dict[str, dict[str, Judgement]]:
-        """Return the verdicts on all claims by reading; claims on runs are not run without runs."""
+        """Return the results on all claims by reading; claims on runs are not run without runs."""
         return {
             id: {reading: self._judge(id, results, reading, effort) for reading in self._list_readings(id)}
             for id in self.book.claims
         }
+
+    def combine(self, row: Mapping[str, Judgement], excluded: Iterable[str]) -> Judgement:
+        """Return the result on a claim in the first reading that is not excluded, unless another choice changes it."""
+        remaining = {name: one for name, one in row.items() if name not in {*excluded}} or row
+        literal, first = next(iter(remaining.items()))
+        others = {n: o for n, o in remaining.items() if n in self.choices and o.verdict is not first.verdict}
+        choice = " and ".join(dict.fromkeys(self.choices[name] for name in others))
+        return compare_alternatives(choice, {literal: first, **others})
+
+    def conclude(self, overall: Mapping[str, Judgement]) -> list[str]:
+        """Return up to three sentences: which headlines hold, which do not, and which are open."""
+        groups: dict[str, list[str]] = {}
+        for id in self.headlines:
+            claim, one = self.book.claims[id].claim, overall[id]
+            if one.verdict is Ruling.HOLDS:
+                groups.setdefault("Holds", []).append(claim)
+            elif one.verdict in (Ruling.FAILS, Ruling.SIZE_DIFFERS):
+                words = " (only the direction does)" if one.verdict is Ruling.SIZE_DIFFERS else ""
+                groups.setdefault("Does not hold", []).append(claim + words)
+            else:
+                on = f" {one.here.partition(':')[0]}" if one.verdict is Ruling.DEPENDS else ""
+                groups.setdefault("Open", []).append(f"{claim} ({one.verdict}{on})")
+        return [
+            f"**{name}:** {'; '.join(groups[name])}." for name in ("Holds", "Does not hold", "Open") if name in groups
+        ]
 
     def _list_readings(self, id: str) -> Mapping[str, str]:
         return (self.run_readings or self.readings) if id in self.book.on_runs else self.readings
@@ -215,61 +256,51 @@ class Paper(Generic[E, R]):
     def _judge(self, id: str, results: Mapping[str, R], reading: str, effort: E) -> Judgement:
         if id in self.book.on_runs and not effort.runs:
             return Judgement(Ruling.NOT_RUN)
-        claim, value = self.book.claims[id], self.book.functions[id](results[reading])
-        if value is not None and not isinstance(value, Found):
-            value = Found(value)
-        return Judgement(decide(claim, value), describe(claim, value))
+        return judge(self.book.claims[id], self.book.functions[id](results[reading]))
 
-    def _make_parts(
-        self, results: Mapping[str, R], judged: Mapping[str, Mapping[str, Judgement]], effort: E, runner: Runner
-    ) -> list[Part]:
-        with use_style():
-            shown = self.show(results)
-        computed = [id for id in self.book.claims if id not in self.book.on_runs]
-        runs = [id for id in self.book.claims if id in self.book.on_runs]
-        folded = [
-            *self._fold("claims", "Claims decided by computation", computed, judged),
-            *self._fold("claims-on-runs", "Claims decided by runs of the searches", runs, judged),
-        ]
+    def _make_parts(self, results: Mapping[str, R], decided: Decided, effort: E, runner: Runner) -> list[Part]:
+        folded = list(self.book.notes)
+        for name, title in (("claims", "computation"), ("claims-on-runs", "runs of the searches")):
+            ids = [id for id in self.book.claims if (id in self.book.on_runs) is (name != "claims")]
+            folded += self._fold(name, f"Claims decided by {title}", ids, decided)
         if self.book.differences:
             parts = (self._tabulate_differences(results, effort),)
             folded.append(Section(title="What is not as printed", parts=parts, folded=True))
         if effort.runs:
             folded.append(Section(title="Runs", parts=(tabulate_runs(runner.records),), folded=True))
-        return [self._tabulate_headlines(judged), *shown, *self.book.notes, *folded]
+        return [self._tabulate_headlines(decided.overall), *self.show(results), *folded]
 
-    def _tabulate_headlines(self, judged: Mapping[str, Mapping[str, Judgement]]) -> Table:
+    def _tabulate_headlines(self, overall: Mapping[str, Judgement]) -> Table:
         rows = []
-        for id in sorted(self.headlines, key=lambda id: next(iter(judged[id].values())).verdict is Ruling.NOT_RUN):
-            claim, row = self.book.claims[id], judged[id]
-            first = next(iter(row.values()))
-            held = [reading for reading, one in row.items() if one.verdict is Ruling.HOLDS]
-            holds_in = "every reading" if len(held) == len(row) else "; ".join(held) or "no reading"
-            shown = {
-                "claim": claim.claim,
-                "printed": _add_unit(claim),
-                "here": first.here,
-                "verdict": str(first.verdict),
-            }
-            rows.append({**shown, "holds in": "" if first.verdict is Ruling.NOT_RUN else holds_in})
+        for id in sorted(self.headlines, key=lambda id: overall[id].verdict is Ruling.NOT_RUN):
+            claim, one = self.book.claims[id], overall[id]
+            rows.append({"claim": claim.claim, "printed": _add_unit(claim), "here": one.here, "result": str(one)})
         return tabulate("headlines", "", rows, prose=True)
 
-    def _fold(
-        self, name: str, title: str, ids: Sequence[str], judged: Mapping[str, Mapping[str, Judgement]]
-    ) -> list[Section]:
-        """Return a folded table of claims, those first whose verdict depends on the reading; nothing without claims."""
+    def _fold(self, name: str, title: str, ids: Sequence[str], decided: Decided) -> list[Section]:
+        """Return a folded table of claims, those first whose result depends on the reading; nothing without claims."""
         if not ids:
             return []
         rows = []
-        for id in sorted(ids, key=lambda id: len({one.verdict for one in judged[id].values()}) == 1):
+        for id in sorted(ids, key=lambda id: len({one.verdict for one in decided.judged[id].values()}) == 1):
             claim = self.book.claims[id]
-            row = {"where": claim.where, "claim": claim.claim, "printed": _add_unit(claim), "rule": claim.rule}
-            row["what is compared"] = claim.note
-            for reading, one in judged[id].items():
+            row = {
+                "where": claim.where,
+                "claim": claim.claim,
+                "printed": _add_unit(claim),
+                "result": str(decided.overall[id]),
+            }
+            row |= {"rule": claim.rule, "what is compared": claim.note}
+            for reading, one in decided.judged[id].items():
                 row[f"reading: {reading}"] = f"{one.verdict}: {one.here}" if one.here else str(one.verdict)
             rows.append(row)
-        words = "\n".join(f"- *{label}*: {sentence}" for label, sentence in self._list_readings(ids[0]).items())
-        return [Section(title=title, parts=(Prose(words), tabulate(name, "", rows, prose=True)), folded=True)]
+        words = []
+        for label, sentence in self._list_readings(ids[0]).items():
+            ending = f"; **excluded by the print**: {decided.excluded[label]}" if label in decided.excluded else ""
+            ending += f"; varies {self.choices[label]}, which is not printed" if label in self.choices else ""
+            words.append(f"- *{label}*: {sentence}{ending}")
+        parts = (Prose("\n".join(words)), tabulate(name, "", rows, prose=True))
+        return [Section(title=title, parts=parts, folded=True)]
 
     def _tabulate_differences(self, results: Mapping[str, R], effort: E) -> Table:
         rows = []
@@ -285,11 +316,16 @@ class Paper(Generic[E, R]):
         return tabulate("differences", "", rows, prose=True)
 
 
-def count_verdicts(verdicts: Mapping[str, Mapping[str, str]]) -> str:
-    """Return a sentence with the number of claims by verdict in the literal reading, from the verdicts of ``summary.json``."""
-    counts = Counter(next(iter(row.values())) for row in verdicts.values())
-    words = ", ".join(f'{n} "{word}"' for word, n in counts.most_common())
-    return f"{len(verdicts)} claims, in the literal reading: {words}."
+def make_gait_figure(caption: str, gaits: Mapping[str, tuple[GaitProblem, Sequence[float]]]) -> Figure:
+    """Return a figure of gaits by name, which the page moves."""
+    curves = {name: prepare_gait(Result(problem=p, x=p.check_x(x))) for name, (p, x) in gaits.items()}
+    return Figure(name="gait", caption=caption, drawing=draw_gaits(curves), gaits=describe_gaits(curves))
+
+
+def count_results(results: Mapping[str, str]) -> str:
+    """Return a sentence with the number of claims by result, from the ``results`` of ``summary.json``."""
+    words = ", ".join(f'{n} "{word}"' for word, n in Counter(results.values()).most_common())
+    return f"{len(results)} claims: {words}."
 
 
 def encode_part(part: Part) -> dict[str, Any]:

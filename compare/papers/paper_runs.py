@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
+from importlib.util import find_spec
 from itertools import count, product
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,17 @@ from compare.study.memo import Computation, Memo
 from compare.study.record import RunRecord, group_by
 from compare.study.run import IPOPT, ProblemSpec, Run, Stop
 from compare.study.study import RECORDS, Study, name_record, run_study
+from metaheuristics import minimize
 from metaheuristics.interface import Algorithm
+from metaheuristics.registry import make_algorithm
 from nlp_gait.backends.exact import ExactModel, build_exact_model
 from nlp_gait.backends.identity import identify_problem
-from nlp_gait.backends.kernel.compiled import available_cores
+from nlp_gait.backends.kernel.compiled import available_cores, compile_objective
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.progress import Progress, ignore_progress
+
+CLOUD = 50  # most points of a cloud
 
 Runs = dict[tuple[str, str], list[RunRecord]]
 """Records in the order of their runs, by title of the problem and of the solver."""
@@ -113,6 +118,53 @@ def evaluate_point(spec: ProblemSpec, x: Sequence[float]) -> Mapping[str, float]
     return _evaluate(spec.name, *(tuple(sorted(values.items())) for values in (spec.options, spec.values)), tuple(x))
 
 
+def collect_cloud(spec: ProblemSpec, algorithm: str, evaluations: int, seed: int = 0) -> list[list[float]]:
+    """Return variables and objective (n + 1,) of feasible points in the order of a search, at most ``CLOUD`` of them."""
+    found = list[Array]()
+    minimize(
+        compile_objective(spec.load(), threads=1),
+        make_algorithm(algorithm),
+        evaluations=evaluations,
+        seed=seed,
+        callback=lambda X, f, violation: found.append(np.column_stack([X, f])[violation <= 0.0]),
+    )
+    points = np.concatenate(found)
+    return (
+        [points[k].tolist() for k in np.unique(np.linspace(0, len(points) - 1, CLOUD).astype(int))]
+        if len(points)
+        else []
+    )
+
+
+def simulate_point(spec: ProblemSpec, x: Sequence[float]) -> dict[str, float | None]:
+    """Return what the engine measures of a gait that drives follow open loop; nothing without MuJoCo.
+
+    Time of a fall [s], None without one; largest tilt [deg], slip [m], landing error [m], rise of the torso [m], number of joints
+    outside their limits, energy of the drives [J], and power with heat by that of the model [%].
+    """
+    if find_spec("mujoco") is None:
+        return {}
+    from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.measurements import measure
+    from nlp_gait.simulation.plan import make_plan
+    from nlp_gait.simulation.simulate import simulate_plan
+
+    problem = spec.load()
+    plan = make_plan(Result(problem=problem, x=problem.check_x(x)))
+    simulation = simulate_plan(plan)
+    measured = measure(plan, simulation, Drive())
+    return {
+        "fell_at_s": measured.fell_at_s,
+        "tilt_deg": measured.largest_tilt_deg,
+        "slip_m": measured.slip_m,
+        "landing_m": max((landing.error_m for landing in measured.landings.values()), default=0.0),
+        "rise_m": float(simulation.torso[-1, 2] - simulation.torso[0, 2]),
+        "outside": len(measured.joint_limits),
+        "energy_J": measured.measured.mechanical_W * plan.duration_s,
+        "power_%": 100 * measured.measured.total_W / measured.predicted.total_W,
+    }
+
+
 def tabulate(name: str, caption: str, rows: Sequence[Mapping[str, Value]], *, prose: bool = False) -> Table:
     """Return a table of rows by heading, numbers to five digits."""
     columns, values = dict.fromkeys(rows[0], ".5g"), [[*row.values()] for row in rows]
@@ -144,6 +196,24 @@ def choose_best(records: Iterable[RunRecord]) -> RunRecord:
     return min(records, key=rank)
 
 
+def read_objective(record: RunRecord) -> float:
+    """Return the exact objective at the end of a run."""
+    return record.objective
+
+
+def read_index(record: RunRecord, name: str) -> float:
+    """Return an exact performance index at the end of a run."""
+    return record.metrics[name]
+
+
 def get_point(record: RunRecord) -> list[float]:
     """Return x in the problem's order."""
     return list(record.x.values())
+
+
+def get_history(record: RunRecord, points: int) -> Array:
+    """Return the best objective (points,) at equal shares of the evaluations of a search; NaN before a feasible one."""
+    counts, best = np.array(record.history.evaluations), np.array(record.history.objective, dtype=float)
+    shares = np.linspace(counts[-1] / points, counts[-1], points)
+    places = np.searchsorted(counts, shares, side="right") - 1
+    return np.where(places < 0, np.nan, best[np.maximum(places, 0)])

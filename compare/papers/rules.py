@@ -9,13 +9,14 @@ A rule is one of
   median of those of repeated tests);
 - ``at least A UNIT``, ``at most A UNIT``: every value;
 - ``same order``: our values have the order of the printed ones;
-- ``rank``: the printed values lie within those of our runs. Beyond them by less than their own range one is not excluded.
+- ``rank``: the printed values lie within 90 % of our runs. Beyond them by less than their own width one is not excluded;
+- ``ahead``: leads of runs over others are positive, or negative, in 95 % of all pairs; otherwise chance decides.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -24,7 +25,8 @@ import numpy as np
 
 ROUNDING = 1e-9  # of a tolerance, so that a value at its edge is within it
 RIPPLE = 1e-3  # of a value: a series that goes back by less between two points still rises or falls, as local optima differ so
-RULE = re.compile(r"(within|rises|falls|p <|at least|at most|same order|rank)(?: ([\d.e-]+))?(?: (\S.*))?")
+BAND = (0.05, 0.95)  # quantiles of runs
+RULE = re.compile(r"(within|rises|falls|p <|at least|at most|same order|rank|ahead)(?: ([\d.e-]+))?(?: (\S.*))?")
 
 
 class Ruling(StrEnum):
@@ -33,8 +35,23 @@ class Ruling(StrEnum):
     HOLDS = "holds"
     SIZE_DIFFERS = "size differs"  # the direction is the printed one
     FAILS = "does not hold"
+    DEPENDS = "depends"  # on a choice that the paper does not print
     NOT_SHOWN = "not shown"  # chance is not excluded, or no feasible result was found
     NOT_RUN = "not run"  # with this effort
+
+
+MARKS = dict(zip(Ruling, "✔≈✘◆?–", strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """The result on a claim, and our numbers."""
+
+    verdict: Ruling
+    here: str = ""
+
+    def __str__(self) -> str:
+        return f"{MARKS[self.verdict]} {self.verdict}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +60,14 @@ class Found:
 
     values: Any
     p: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class Alternatives:
+    """Our numbers by the values of a choice that the paper does not print."""
+
+    choice: str  # "the time of a step"
+    found: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +110,28 @@ class ClaimRow:
         return all(value[0] in "+-" for value in self.printed.split(" / "))
 
 
+def judge(claim: ClaimRow, value: Any) -> Judgement:
+    """Return the result on a claim from what its function returned; alternatives that differ make it depend on their choice."""
+    if isinstance(value, Alternatives):
+        return compare_alternatives(value.choice, {label: judge(claim, one) for label, one in value.found.items()})
+    found = value if value is None or isinstance(value, Found) else Found(value)
+    return Judgement(decide(claim, found), describe(claim, found))
+
+
+def compare_alternatives(choice: str, judged: Mapping[str, Judgement]) -> Judgement:
+    """Return the common result of alternatives, or that it depends on their choice, with each of them."""
+    first = next(iter(judged.values()))
+    if all(one.verdict is first.verdict for one in judged.values()):
+        here = {one.here for one in judged.values()}
+        return (
+            first
+            if len(here) == 1
+            else Judgement(first.verdict, "; ".join(f"{k}: {v.here}" for k, v in judged.items()))
+        )
+    words = "; ".join(f"{label}: {one.verdict} ({one.here})" for label, one in judged.items())
+    return Judgement(Ruling.DEPENDS, f"on {choice}: {words}")
+
+
 def decide(claim: ClaimRow, result: Found | None) -> Ruling:
     """Return the verdict on a claim; None if there is no feasible result."""
     if result is None:
@@ -109,6 +156,11 @@ def decide(claim: ClaimRow, result: Found | None) -> Ruling:
         return _say(np.array_equal(np.argsort(ours, kind="stable"), np.argsort(claim.values, kind="stable")))
     if kind == "rank":
         return _judge_ranks(claim.values, np.atleast_2d(ours))
+    if kind == "ahead":
+        low, high = np.quantile(np.atleast_2d(ours), BAND, axis=1) / 100
+        if (low > RIPPLE).all():
+            return Ruling.HOLDS
+        return Ruling.FAILS if (high < -RIPPLE).any() else Ruling.NOT_SHOWN
     slack = ROUNDING * abs(size)
     return _say(bool(np.all(ours >= size - slack if kind == "at least" else ours <= size + slack)))
 
@@ -124,10 +176,11 @@ def _compare(claim: ClaimRow, ours: np.ndarray[Any, Any], size: float, *, relati
 
 
 def _judge_ranks(printed: np.ndarray[Any, Any], runs: np.ndarray[Any, Any]) -> Ruling:
-    beyond = np.maximum(runs.min(axis=1) - printed, printed - runs.max(axis=1))
+    low, high = np.quantile(runs, BAND, axis=1)
+    beyond = np.maximum(low - printed, printed - high)
     if (beyond <= 0).all():
         return Ruling.HOLDS
-    return Ruling.NOT_SHOWN if (beyond <= np.ptp(runs, axis=1)).all() else Ruling.FAILS
+    return Ruling.NOT_SHOWN if (beyond <= high - low).all() else Ruling.FAILS
 
 
 def _say(holds: bool) -> Ruling:
@@ -138,14 +191,22 @@ def describe(claim: ClaimRow, result: Found | None) -> str:
     """Return our numbers as a cell shows them; long series by their ends, runs by the rank of the printed value."""
     if result is None:
         return "no feasible result"
-    values = np.asarray(result.values, dtype=float)
-    if claim.parts[0] == "rank":
+    values, kind = np.asarray(result.values, dtype=float), claim.parts[0]
+    unit = f" {claim.unit}" if claim.unit else ""
+    if kind == "rank":
         rows = np.atleast_2d(values)
         ranks = " / ".join(str((row < printed).sum()) for row, printed in zip(rows, claim.values, strict=True))
         ends = "; ".join(f"{row.min():.4g} to {row.max():.4g}" for row in rows)
-        return f"{ends}{_space(claim.unit)}; {ranks} of {rows.shape[1]} runs below"
-    signed = claim.parts[0] == "within" and claim.signed
-    text = "; ".join(_join(row, signed) for row in np.atleast_2d(values)) + _space(claim.unit)
+        return f"{ends}{unit}; {ranks} of {rows.shape[1]} runs below"
+    if kind == "ahead":
+        ends = np.quantile(np.atleast_2d(values), BAND, axis=1).T
+        return (
+            "; ".join(f"{low:.1f} to {high:.1f}" for low, high in ends) + f"{unit} (90 % of {values.shape[-1]} pairs)"
+        )
+    signed = kind == "within" and claim.signed
+    text = "; ".join(_join(row, signed) for row in np.atleast_2d(values)) + unit
+    if kind == "within" and values.size > 3:
+        text += f"; {_count_rounded(claim, values)} of {values.size} round to the print"
     if result.p is None:
         return text
     tests = np.atleast_1d(result.p)
@@ -153,11 +214,20 @@ def describe(claim: ClaimRow, result: Found | None) -> str:
     return f"{text}, p = {np.median(tests):.2g}{spread}"
 
 
+def _count_rounded(claim: ClaimRow, values: np.ndarray[Any, Any]) -> int:
+    """Return how many values are the printed ones, rounded to as many decimals."""
+    decimals = [len(printed.partition(".")[2]) for printed in claim.printed.split(" / ")]
+    pairs = zip(values, claim.values, decimals, strict=True)
+    return sum(abs(value - printed) <= 0.5 * 10.0**-digits for value, printed, digits in pairs)
+
+
 def _join(row: Sequence[float], signed: bool) -> str:
-    sign = "+" if signed else ""
-    shown = [format(value, f"{sign}z.{6 if float(value).is_integer() else 4}g") for value in row]
-    return f"{shown[0]} to {shown[-1]}" if len(shown) > 8 else " / ".join(shown)
-
-
-def _space(unit: str) -> str:
-    return f" {unit}" if unit else ""
+    """Return values with common decimals, four digits of the largest one; each with its own if they differ a thousandfold."""
+    sign, sizes = "+" if signed else "", [abs(value) for value in row if value]
+    form = f"{sign}z.4g"
+    if all(float(value).is_integer() for value in row):
+        form = f"{sign}z.0f"
+    elif sizes and max(sizes) < 1000 * min(sizes) and len(row) > 1:
+        form = f"{sign}z.{max(0, 3 - int(np.floor(np.log10(max(sizes)))))}f"
+    shown = [format(value, form) for value in row]
+    return f"{shown[0]} to {shown[-1]}" if len(shown) > 9 else " / ".join(shown)

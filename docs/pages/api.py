@@ -40,16 +40,15 @@ DOORS = {
     "compare.analysis.comparison": ("Comparison", "SolverRuns", "compare_problems"),
     "compare.analysis.columns": ("Column", "format_rows", "summarise"),
     "compare.analysis.record_statistics": ("approximate_rank_sum",),
-    "compare.papers.paper": ("Book", "Paper", "count_verdicts", "read_book"),
+    "compare.papers.paper": ("Book", "Paper", "read_book"),
     "compare.papers.paper_runs": (
         *("Effort", "Runner", "choose_best", "evaluate_point", "make_computation", "make_search_tasks"),
         *("make_start_tasks", "tabulate"),
     ),
-    "compare.papers.rules": ("Found",),
+    "compare.papers.rules": ("Alternatives", "Found"),
     "compare.report": (),
     "compare.report.document": ("Document", "Figure", "Prose", "Section", "Table", "make_text_table"),
     "compare.report.writing": ("render_markdown", "write_document"),
-    "compare.archive": (),
 }
 ORDER = ("function", "class", "exception", "data")  # on a page; within each as the module lists them
 CODE = re.compile(r"(``.+?``)")

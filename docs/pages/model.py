@@ -13,6 +13,8 @@ from docs.pages.markdown import code, page, table, write_all
 from docs.pages.problems import names
 from nlp_gait.backends.nlp import WIDTHS
 from nlp_gait.formulation import load
+from nlp_gait.gaits.stairs.closed_loop import QUANTUM
+from nlp_gait.gaits.stairs.leg_network import ONLINE, PRINTED
 from nlp_gait.robots import load_robot
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -24,7 +26,7 @@ BLUE, ORANGE = "#0072B2", "#D55E00"
 def write(folder: Path) -> None:
     """Write drawings and tables."""
     own = folder / "model"
-    write_all(own, {"counts.md": count_constraints(), "levels.md": list_levels()})
+    write_all(own, {"counts.md": count_constraints(), "levels.md": list_levels(), "stairs.md": list_stair_constants()})
     for name, drawing in (("sole", draw_sole()), ("smoothed-margin", draw_smoothed_margin())):
         (own / f"{name}.svg").write_text(render_svg(drawing), encoding="utf-8")
 
@@ -67,6 +69,27 @@ def list_levels() -> str:
         for row in measured
     ]
     return page(table(header, rows))
+
+
+def list_stair_constants() -> str:
+    """Return the constants of the stairs paper's closed loop and network."""
+    problem = load("stairs-track")
+    rows = [("Δt", f"{QUANTUM:g}", "s", "quantum of time")]
+    shown = ("ground_stiffness_N_m", "ground_damping_N_s_m", "friction", "disturbance_Nm", "zmp_weight")
+    for parameter in problem.parameters:
+        if parameter.name in shown:
+            value = f"{problem.value(parameter.name):.4g}"
+            rows.append((code(parameter.name), value, parameter.unit, parameter.description))
+    for words, network in (("as printed", PRINTED), ("within a search", ONLINE)):
+        rows.append(
+            (
+                f"α, {words}",
+                f"{network.rate:g}",
+                "1",
+                f"at most {network.iterations} steps, {network.hidden} hidden nodes",
+            )
+        )
+    return page(table(("constant", "value", "unit", "meaning"), rows))
 
 
 def draw_sole() -> Any:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from compare.papers import REPRODUCTIONS, load_reproduction
-from compare.papers.paper import count_verdicts
+from compare.papers.paper import count_results
 from compare.study.citations import find_citations
 from docs.pages.markdown import literal, page, table, write_all
 
@@ -29,12 +29,12 @@ def read_record(name: str) -> dict[str, Any]:
 
 
 def list_page() -> str:
-    """Return the table of papers with their verdicts."""
+    """Return the table of papers with their results."""
     rows = [
-        [f"[{load_reproduction(name).title}](papers/{name}.md)", literal(count_verdicts(read_record(name)["verdicts"]))]
+        [f"[{load_reproduction(name).title}](papers/{name}.md)", literal(count_results(read_record(name)["results"]))]
         for name in REPRODUCTIONS
     ]
-    return page(table(["paper", "verdicts"], rows))
+    return page(table(["paper", "results"], rows))
 
 
 def paper_page(name: str) -> str:
@@ -42,7 +42,10 @@ def paper_page(name: str) -> str:
     record = read_record(name)
     made = record["made"]
     words = f"Computed by `{made['command']}`, version {made['nlp-gait']}, on {made['date'][:10]}, {made['processor']}."
-    return page(literal(count_verdicts(record["verdicts"])), *_format_parts(name, record["parts"]), literal(words))
+    sentences, counted = "\n\n".join(record["sentences"]), literal(count_results(record["results"]))
+    return page(
+        load_reproduction(name).citation, sentences, *_format_parts(name, record["parts"]), counted, literal(words)
+    )
 
 
 def _format_parts(name: str, parts: Iterable[dict[str, Any]]) -> list[str]:
@@ -56,9 +59,8 @@ def _format_parts(name: str, parts: Iterable[dict[str, Any]]) -> list[str]:
                 "</details>",
             ]
         elif "figure" in part:
-            blocks.append(
-                f"```{{image}} /papers/{name}.svg\n:alt: {part['caption']}\n```\n\n{literal(part['caption'])}"
-            )
+            file = f"/papers/{name}/{part['figure']}.svg"
+            blocks.append(f"```{{image}} {file}\n:alt: {part['caption']}\n```\n\n{literal(part['caption'])}")
         elif "columns" in part:
             blocks += [literal(part["caption"])] if part["caption"] else []
             blocks.append(table([*map(literal, part["columns"])], ([*map(literal, row)] for row in part["rows"])))

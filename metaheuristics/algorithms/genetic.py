@@ -171,20 +171,26 @@ class GeneticAlgorithm:
             if not callable(getattr(self, name)):
                 raise bad_setting(self, name, "an operator of metaheuristics.algorithms.genetic or alike")
 
-    @classmethod
-    def goswami2008(cls) -> "GeneticAlgorithm":
-        """Give the settings of the 12-link walking paper; 30 epochs after the first population are 930 evaluations.
-
-        The paper names neither the size of a tournament nor survival nor elites; 2, generational and 1 are our choice.
-
-        Source:
-            Goswami, Vadakkepat, Phung (2008), Table II and section 5.4.
-        """
-        crossover, mutation = SinglePoint(probability=0.8), Flip(probability=0.1)
-        return cls(population=30, crossover=crossover, mutation=mutation, survival="generational")
-
     def start(self, start: Start) -> "_GeneticSearch":
         return _GeneticSearch(self, start)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class GoswamiGeneticAlgorithm(GeneticAlgorithm):
+    """Genetic algorithm of the 12-joint walk's paper; its 30 epochs after the first population are 930 evaluations.
+
+    The paper names neither the size of a tournament nor survival nor elites; 2, generational and 1 are our choice.
+
+    Source:
+        Goswami, Vadakkepat, Phung (2008), Table II and section 5.4.
+    """
+
+    population: int = 30  #: Number of parents, and of children in a generation
+    crossover: Crossover = field(default=SinglePoint(probability=0.8))  #: Operator on pairs
+    mutation: Mutation = field(default=Flip(probability=0.1))  #: Operator on children
+    #: "generational" replaces the parents by the children, except for the elites; "plus" keeps the best of both
+    survival: Literal["plus", "generational"] = "generational"
+    name: ClassVar[str] = "ga-goswami"
 
 
 def hold_tournaments(places: int, population: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:

@@ -25,7 +25,6 @@ ALL: dict[str, Callable[[], Algorithm]] = {
     **ALGORITHMS,
     **{name: partial(make_algorithm, name) for name in ("cma", "de", "pymoo:GA", "pymoo:PSO", "pymoo:NSGA2")},
     "ga-generational": partial(GeneticAlgorithm, survival="generational", elites=2),
-    "ga-goswami": GeneticAlgorithm.goswami2008,
 }
 BUDGET = 620  # not a multiple of any population, so that the last generation is cut short
 

@@ -28,6 +28,7 @@ from metaheuristics import (
 from metaheuristics.adapters.cma import CmaEs
 from metaheuristics.adapters.pymoo import Pymoo
 from metaheuristics.algorithms.differential_evolution import DifferentialEvolution, LShade
+from metaheuristics.algorithms.genetic import GoswamiGeneticAlgorithm
 from metaheuristics.multi_objective import make_front_algorithm
 from metaheuristics.settings import check_installed
 
@@ -92,7 +93,12 @@ def test_lookup_by_name(name: str) -> None:
 @pytest.mark.parametrize(
     ("make", "name", "settings", "message"),
     [
-        (make_algorithm, "psoo", {}, "unknown algorithm 'psoo'; did you mean 'pso'.*Known: pso, pso-constant, ga, aco"),
+        (
+            make_algorithm,
+            "psoo",
+            {},
+            "unknown algorithm 'psoo'; did you mean 'pso'.*Known: pso, pso-constant, ga, ga-goswami",
+        ),
         (make_algorithm, "simplex", {}, "unknown algorithm 'simplex'; Known"),
         (make_algorithm, "pymoo:GAA", {}, "unknown algorithm 'pymoo:GAA'; did you mean 'pymoo:GA'"),
         (make_algorithm, "pso", {"inertial": 1.0}, "'pso' has no setting 'inertial'; did you mean 'inertia'"),
@@ -110,11 +116,9 @@ def test_unknown_names_are_answered_with_near_ones(
 
 
 def test_the_settings_of_goswami_2008() -> None:
-    preset = GeneticAlgorithm.goswami2008()
-    assert (preset.population, preset.crossover, preset.mutation) == (
-        30,
-        SinglePoint(probability=0.8),
-        Flip(probability=0.1),
+    preset = make_algorithm("ga-goswami")
+    assert preset == GoswamiGeneticAlgorithm(
+        population=30, crossover=SinglePoint(probability=0.8), mutation=Flip(probability=0.1), survival="generational"
     )
 
 

@@ -1,7 +1,7 @@
 """Gupta, Pratihar, Deb (2023): NAO's single and double support at least power, in two readings of the margins.
 
-The printed reading takes ten samples, (19) and (20) with g = 9.8 as a number, and 23 masses in double support; the other one ten
-intervals and physical gravity.
+The reconstructed reading takes ten samples, (19) and (20) with g = 9.8 as a number, and 23 masses in double support, which gives
+the printed margins; the physical one takes ten intervals and physical gravity.
 """
 
 from __future__ import annotations
@@ -13,22 +13,28 @@ from functools import partial
 import numpy as np
 
 from compare.analysis.record_statistics import approximate_rank_sum
+from compare.papers.nao.dh import measure_stretched_height, measure_tables
 from compare.papers.nao.results import (
+    COMPARED,
     HIPS_M,
     KINDS,
     MARGINS,
+    OPEN_GA,
     PHASES,
+    PHYSICAL,
     PRINTED,
     PRINTED_X,
     READINGS,
+    RECONSTRUCTED,
     SEARCHES,
+    SWEEPS,
     TIMES,
     NaoEffort,
     NaoResults,
     compute,
     make_spec,
 )
-from compare.papers.nao.tables import JOINTS, compute_powers, list_errors, list_levels, list_margins, show
+from compare.papers.nao.tables import compute_powers, list_errors, list_levels, list_margins, show
 from compare.papers.paper import Paper, parse_settings, read_book
 from compare.papers.paper_runs import evaluate_point
 from compare.papers.rules import Found
@@ -37,6 +43,12 @@ from nlp_gait.formulation.signals import Signals
 BOOK = read_book(__file__)
 TEST_RUNS = 11  # of each search in the paper's tests
 PACES = 9  # durations at which a printed gait is evaluated
+FORWARD_M_S, LATERAL = (
+    (0.008, 0.02, 0.05),
+    (1.0, 1.5, 2.0),
+)  # forward velocities; lateral ones as multiples of the printed
+MISFIT_MM = 1.0  # of a margin, ten printed digits: a reading that misses by more is excluded
+FALLEN_DEG = 90.0
 Change = Callable[[NaoResults, str], dict[str, float]]
 
 
@@ -112,18 +124,6 @@ def list_hip_ranges(result: NaoResults, searches: Sequence[str]) -> list[float]:
     return [1000 * float(np.ptp(result.sample("ssp", search).arrays["hip"][:, 2])) for search in searches]
 
 
-def list_joint_leads(result: NaoResults, kind: str) -> list[float]:
-    """Return the share of a kind of joints in the power less the largest other one, of both printed solutions [%]."""
-    leads = []
-    for search in SEARCHES:
-        (mechanical, heat), shares = compute_powers(result, search), dict.fromkeys((*JOINTS, "arms"), 0.0)
-        for joint, power in mechanical.items():
-            group = next((k for k in JOINTS if joint[1:].startswith(k)), "arms")
-            shares[group] += 100 * (power + heat[joint]) / (sum(mechanical.values()) + sum(heat.values()))
-        leads.append(shares.pop(kind) - max(shares.values()))
-    return leads
-
-
 def list_swing_shares(result: NaoResults) -> list[float]:
     """Return the share of the swing leg in the power of the hips, with heat, and of its mechanical part [%]."""
     mechanical, heat = compute_powers(result)
@@ -178,15 +178,81 @@ def compute_test(rank_sum: int, runs: int = TEST_RUNS) -> list[float]:
 def compare_searches(result: NaoResults, phase: str) -> Found:
     """Return the lead of PSO's median [mW], and the p-values of the paper's test, repeated with other runs."""
     pso, ga = (result.final_powers(phase, search) for search in SEARCHES)
-    firsts = range(0, len(pso) - TEST_RUNS + 1, TEST_RUNS) or range(1)
+    firsts = range(0, min(len(pso), len(ga)) - TEST_RUNS + 1, TEST_RUNS) or range(1)
     tests = [approximate_rank_sum(pso[k : k + TEST_RUNS], ga[k : k + TEST_RUNS]) for k in firsts]
     return Found(1000 * float(np.median(ga) - np.median(pso)), p=tests)
 
 
-def list_run_excesses(result: NaoResults, phase: str) -> list[float]:
-    """Return the power at the end of PSO's runs above the optimum, sorted [%]."""
+def count_found_optima(result: NaoResults, phase: str) -> list[list[int]]:
+    """Return how many of 11 runs of PSO end within 1 % of the optimum, for all sets of 11."""
     best = result.best(make_spec(phase, result.reading)).objective
-    return sorted(100 * (power / best - 1) for power in result.final_powers(phase, "PSO"))
+    found = [power <= 1.01 * best for power in result.final_powers(phase, "PSO")]
+    return [[sum(found[k : k + TEST_RUNS]) for k in range(0, len(found) - TEST_RUNS + 1, TEST_RUNS)] or [sum(found)]]
+
+
+def compute_swing_price(result: NaoResults, search: str, height_m: float, other_m: float) -> float:
+    """Return the power of a search's printed solution at a swing height above that of PSO's at another one [%]."""
+    power, reference = (
+        result.measure("ssp", name, swing_height_m=h)["power_W"] for name, h in ((search, height_m), ("PSO", other_m))
+    )
+    return 100 * (power / reference - 1)
+
+
+def list_simulated(result: NaoResults, key: str) -> list[float] | None:
+    """Return a number of the simulated printed solutions; None without MuJoCo."""
+    runs = [result.computed[f"simulation-{phase}-{search}"] for phase in PHASES for search in SEARCHES]
+    return [run[key] for run in runs] if all(runs) else None
+
+
+def list_tilts(result: NaoResults) -> list[float] | None:
+    """Return the largest tilt of the printed solutions in the engine [deg]; 90 after a fall."""
+    falls, tilts = (list_simulated(result, key) for key in ("fell_at_s", "tilt_deg"))
+    return tilts and [t if fall is None else FALLEN_DEG for fall, t in zip(falls or [], tilts, strict=True)]
+
+
+def list_faster(result: NaoResults) -> list[list[float]]:
+    """Return the power of PSO's printed single support at larger forward velocities at its start, and at its end [W]."""
+    names = ("hip_vx_start_m_s", "hip_vx_end_m_s")
+    return [[result.measure("ssp", **{name: v})["power_W"] for v in FORWARD_M_S] for name in names]
+
+
+def list_wider(result: NaoResults) -> list[float]:
+    """Return the power of PSO's printed single support at larger lateral velocities [W]."""
+    x6, x7 = PRINTED_X["ssp", "PSO"][5:7]
+    return [result.measure("ssp", hip_vy_start_m_s=k * x6, hip_vy_end_m_s=k * x7)["power_W"] for k in LATERAL]
+
+
+def count_gaps(result: NaoResults) -> int | None:
+    """Return the number of durations of double support without a gait; None in the physical reading, which is excluded."""
+    return len(SWEEPS["gap", "dsp"][1]) - len(result.sweep("gap", "dsp")) if result.reading == RECONSTRUCTED else None
+
+
+def compute_speed_gain(result: NaoResults) -> float:
+    """Return the mean speed of the hip at the shortest feasible duration of the sweeps, double by single support."""
+    speeds = []
+    for phase in PHASES:
+        hip = result.sample(phase).arrays["hip"]
+        shortest = min(duration for duration, _ in result.sweep("time", phase))
+        speeds.append(float(np.linalg.norm(hip[-1] - hip[0])) / shortest)
+    return speeds[1] / speeds[0]
+
+
+def list_excluded(results: Mapping[str, NaoResults]) -> dict[str, str]:
+    """Return why the print excludes readings."""
+    reasons, errors = {}, {name: max(map(abs, list_errors(results[name], "ssp"))) for name in READINGS}
+    if errors[PHYSICAL] > MISFIT_MM:
+        reasons[PHYSICAL] = (
+            f"its margins of single support miss the printed ones by up to {errors[PHYSICAL]:.1f} mm, those of the "
+            f"reconstructed reading by {errors[RECONSTRUCTED]:.2f} mm"
+        )
+    if "constant" in results:
+        powers, printed = results["constant"].final_powers("ssp", "PSO"), results["constant"].measure("ssp")["power_W"]
+        if min(powers) > printed:
+            reasons["constant"] = (
+                f"the best of {len(powers)} runs needs {100 * (min(powers) / printed - 1):.1f} % more power in single support "
+                "than the printed median run"
+            )
+    return reasons
 
 
 for _phase in PHASES:
@@ -203,7 +269,7 @@ for _phase in PHASES:
         }
     )
     BOOK.bind({f"better-{_phase}": partial(compare_searches, phase=_phase)}, runs=True)
-    BOOK.bind({f"same-optimum-{_phase}": partial(list_run_excesses, phase=_phase)}, runs=True)
+    BOOK.bind({f"same-optimum-{_phase}": partial(count_found_optima, phase=_phase)}, runs=True)
 BOOK.bind(
     {
         "least-margins-dsp": lambda r: list_margins(r, "dsp", MARGINS[:2]),
@@ -220,8 +286,17 @@ BOOK.bind(
         "relief": list_relief,
         "few-mm": lambda r: list_hip_ranges(r, SEARCHES),
         "hip-variation": lambda r: list_hip_ranges(r, SEARCHES[::-1]),
-        "knees": lambda r: list_joint_leads(r, "Knee"),
-        "hips": lambda r: list_joint_leads(r, "Hip"),
+        "swing-24": lambda r: [compute_swing_price(r, "PSO", 0.024, 0.015)],
+        "swing-28": lambda r: [compute_swing_price(r, "PSO", 0.028, 0.015)],
+        "swing-ga": lambda r: [compute_swing_price(r, "GA", 0.024, 0.024)],
+        "simulator": list_tilts,
+        "simulator-limits": lambda r: list_simulated(r, "outside"),
+        "forward-range": list_faster,
+        "lateral-range": list_wider,
+        "velocities-dsp": lambda r: list(r.best(make_spec("dsp", r.reading)).x.values())[3:5],
+        "gap-dsp": count_gaps,
+        "highest-hip": lambda r: measure_stretched_height(),
+        "faster-dsp": compute_speed_gain,
         "swing-hip": list_swing_shares,
         "swing-joints": list_swing_joints,
         "lateral-margin": compute_lateral_gain,
@@ -234,18 +309,18 @@ BOOK.bind({"torque-rank": lambda r: [run.metrics["torque_change_Nm"] for run in 
 
 
 def measure_choice(results: Mapping[str, NaoResults], id: str) -> dict[str, float]:
-    """Return the largest error of the printed margins with one choice of the printed reading alone [mm]."""
+    """Return the largest error of the printed margins with one choice of the reconstructed reading alone [mm]."""
     options, effects = parse_settings(BOOK.differences[id].option)[0], dict[str, float]()
     kinds = {"ssp": ("margins of single support", MARGINS), "dsp": ("least margins of double support", MARGINS[:2])}
     for phase in ("dsp",) if id == "masses" else PHASES:
         (words, indexes), errors = kinds[phase], list[float]()
         for search in SEARCHES:
-            figures = evaluate_point(make_spec(phase, "physical", **options), PRINTED_X[phase, search])
+            figures = evaluate_point(make_spec(phase, PHYSICAL, **options), PRINTED_X[phase, search])
             errors += [1000 * abs(figures[index] - PRINTED[phase, search][index]) for index in indexes]
         effects[f"largest error of {words}, with this choice alone [mm]"] = max(errors)
-        for reading, what in (("physical", "none"), ("printed", "all")):
+        for reading, what in ((PHYSICAL, "none"), (RECONSTRUCTED, "all")):
             errors = list_errors(results[reading], phase, indexes)
-            effects[f"largest error of {words}, with {what} of the printed reading [mm]"] = max(map(abs, errors))
+            effects[f"largest error of {words}, with {what} of the reconstructed reading [mm]"] = max(map(abs, errors))
     return effects
 
 
@@ -253,8 +328,8 @@ def measure_option(results: Mapping[str, NaoResults], id: str) -> dict[str, floa
     """Return the changes of PSO's printed solutions with the option of a difference."""
     options, effects = parse_settings(BOOK.differences[id].option)[0], dict[str, float]()
     for phase in ("dsp",) if id in ("lever", "arms-shared") else PHASES:  # of double support alone
-        after = evaluate_point(make_spec(phase, "printed", **options), PRINTED_X[phase, "PSO"])
-        before = results["printed"].measure(phase)
+        after = evaluate_point(make_spec(phase, RECONSTRUCTED, **options), PRINTED_X[phase, "PSO"])
+        before = results[RECONSTRUCTED].measure(phase)
         for name, index in zip(("power", "torque change"), KINDS.values(), strict=True):
             effects[f"{name} of {PHASES[phase]} [%]"] = 100 * (after[index] / before[index] - 1)
         largest = max(1000 * abs(after[index] - before[index]) for index in MARGINS)
@@ -262,26 +337,46 @@ def measure_option(results: Mapping[str, NaoResults], id: str) -> dict[str, floa
     return effects
 
 
+def measure_swarm(results: Mapping[str, NaoResults]) -> dict[str, str]:
+    """Return how runs of the synchronous and of the asynchronous swarm end."""
+    effects = {}
+    for phase, words in PHASES.items():
+        ends = {
+            "all together": results["damped"].final_powers(phase, "PSO"),
+            "at once": results["damped"].computed[f"asynchronous-{phase}"],
+        }
+        for name, powers in ends.items():
+            low, middle, high = np.quantile(powers, (0.05, 0.5, 0.95))
+            effects[f"power in {words}, {name}"] = (
+                f"{middle:.4f} W ({low:.4f} to {high:.4f} in 90 % of {len(powers)} runs)"
+            )
+    return effects
+
+
 BOOK.bind({id: partial(measure_choice, id=id) for id in ("zmp", "samples", "masses")})
 OPTIONAL = ("lever", "arms-shared", "finite", "robot", "separate", "held")
 BOOK.bind({id: partial(measure_option, id=id) for id in OPTIONAL})
+BOOK.bind({"dh": lambda results: measure_tables()})
+BOOK.bind({"swarm": measure_swarm}, runs=True)
 
 
 REPRODUCTION: Paper[NaoEffort, NaoResults] = Paper(
     book=BOOK,
     title="The gait cycle of NAO: Gupta, Pratihar, Deb (2023)",
-    full=NaoEffort(runs=10 * TEST_RUNS),
+    citation=(
+        "P. Gupta, D. K. Pratihar, K. Deb: *Analysis and optimization of gait cycle of 25-DOF NAO robot using particle swarm "
+        "optimization and genetic algorithms*, COIN Report 2023008."
+    ),
+    full=NaoEffort(runs=5 * TEST_RUNS),
     quick=NaoEffort(),
     readings=READINGS,
-    run_readings={
-        f"{reading}, {label}": f"{reading} reading; PSO with {word}"
-        for reading in READINGS
-        for label, word in (("constant", "the inertia weight of 1"), ("damped", "the damping of the cited code"))
-    },
+    run_readings={name: words for name, (_, _, words) in COMPARED.items()},
+    choices={name: OPEN_GA for name in ("all crossed", "one elite", "no elite", "penalty")},
+    exclude=list_excluded,
     compute=compute,
     headlines=(
-        *("margins-ssp", "pso-optimal-ssp", "better-ssp", "better-dsp", "mean-x-lead-ssp"),
-        *("torque-level-ssp", "least-margins-dsp", "power-level-ssp", "torque-level-dsp", "slower-ssp"),
+        *("margins-ssp", "pso-optimal-ssp", "better-ssp", "better-dsp", "same-optimum-ssp"),
+        *("swing-24", "swing-ga", "simulator", "higher-hip-ssp", "power-level-ssp"),
     ),
     show=show,
 )

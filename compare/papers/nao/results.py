@@ -1,43 +1,65 @@
-"""Results of Gupta, Pratihar, Deb (2023) in both readings: printed solutions, optima, sweeps, and runs of the searches."""
+"""Results of Gupta, Pratihar, Deb (2023) in both readings: printed solutions, optima, sweeps, simulations, runs of searches."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from compare.papers.nao import swarm
 from compare.papers.paper import read_rows
 from compare.papers.paper_runs import (
     Effort,
     Runner,
     Runs,
     choose_best,
+    collect_cloud,
     evaluate_point,
+    make_computation,
     make_search_tasks,
     make_start_tasks,
+    simulate_point,
 )
+from compare.study.memo import Computation
 from compare.study.record import RunRecord
-from compare.study.run import IPOPT, ProblemSpec, Run
+from compare.study.run import IPOPT, Handling, ProblemSpec, Run
+from metaheuristics import GeneticAlgorithm
+from metaheuristics.algorithms.genetic import SimulatedBinary
 from metaheuristics.registry import make_algorithm
 from nlp_gait.formulation.signals import Signals
 
 FOLDER = Path(__file__).parent
+PENALTY_W = 100.0  # per unit of violation
 SOLUTIONS = FOLDER / "solutions.csv"
 PHASES = {"ssp": "single support", "dsp": "double support"}
 MARGINS = tuple(f"dbm_{axis}_{kind}_m" for kind in ("min", "mean") for axis in "xy")
 KINDS = {"power": "power_W", "torque": "torque_change_Nm"}
 INDEXES = (*KINDS.values(), *MARGINS)
-READINGS = {
-    "printed": "ten samples, (19) and (20) with g = 9.8 as printed, 23 masses in double support",
+RECONSTRUCTED, PHYSICAL = READINGS = {
+    "reconstructed": "ten samples, (19) and (20) with g = 9.8, 23 masses in double support: what gives the printed margins",
     "physical": "ten intervals, physical gravity, all masses",
 }
 PRINTED_OPTIONS: Mapping[str, Any] = {"intervals": 9, "zmp_gravity": "printed"}
 SEARCHES = ("PSO", "GA")
-SWARMS = {"constant": "pso-constant", "damped": "pso"}
+# Searches by reading of the claims on runs: swarm, GA, and words. All are in the reconstructed reading.
+OPEN_GA = "the GA's crossover rate, survival and constraint handling"
+COMPARED = {
+    "damped": (
+        "pso",
+        "ga",
+        "PSO with the damping of the cited code; GA with Deb's rules; the best of parents and children survive",
+    ),
+    "constant": ("pso-constant", "ga", "PSO with the printed inertia weight of 1"),
+    "all crossed": ("pso", "ga-crossed", "as damped; the GA crosses every pair"),
+    "one elite": ("pso", "ga-elite", "as damped; children replace all parents of the GA but the best"),
+    "no elite": ("pso", "ga-generational", "as damped; children replace all parents of the GA"),
+    "penalty": ("pso", "ga-penalty", f"as damped; the GA adds {PENALTY_W:g} W times the violation to the power"),
+}
 TIMES = {"ssp": "single_support_time_s", "dsp": "double_support_time_s"}
 HIPS_M = (0.256, 0.27, 0.29, 0.31)
 SWEEPS: Mapping[tuple[str, str], tuple[str, tuple[float, ...]]] = {
@@ -46,14 +68,15 @@ SWEEPS: Mapping[tuple[str, str], tuple[str, tuple[float, ...]]] = {
     ("time", "ssp"): (TIMES["ssp"], (0.7, 1.0, 2.0, 4.0)),
     ("time", "dsp"): (TIMES["dsp"], (0.3, 0.5, 1.0, 2.0)),
     ("swing", "ssp"): ("swing_height_m", (0.024, 0.028)),
+    ("gap", "dsp"): (TIMES["dsp"], (0.8, 1.1, 1.2, 1.3, 1.4, 1.6, 1.8)),
 }
-SHARES = [(share, arms) for share in ("printed", "lever") for arms in ("carried", "separate", "shared")]
 
 
 @dataclass(frozen=True, kw_only=True)
 class NaoEffort(Effort):
     """Effort of the reproduction; what does not depend on runs of the searches is the same in each."""
 
+    variant_runs: int = 22  # of each other GA
     evaluations: int = 10_000  # of a search, as in the paper
     starts: int = 3  # of IPOPT at each optimum from random points, and at most one for each point of a sweep
 
@@ -66,7 +89,7 @@ PRINTED = {(row["phase"], row["search"]): {i: float(row[i]) for i in INDEXES} fo
 def make_spec(phase: str, reading: str, label: str = "", **options: Any) -> ProblemSpec:
     """Return the problem of a phase in a reading, with further options."""
     printed = {**PRINTED_OPTIONS, **({"zmp_masses": 23} if phase == "dsp" else {})}
-    chosen = {**(printed if reading == "printed" else {}), **options}
+    chosen = {**(printed if reading == RECONSTRUCTED else {}), **options}
     return ProblemSpec(name=f"nao-{phase}", options=chosen, label=f"nao-{phase}-{reading}{label}")
 
 
@@ -88,7 +111,8 @@ class NaoResults:
 
     reading: str
     runs: Runs
-    swarm: str = ""  # that is PSO; empty without runs
+    computed: Mapping[str, Any] = field(default_factory=dict)  # by name
+    searches: Mapping[str, str] = field(default_factory=dict)  # labels of the runs of PSO and GA; empty without runs
 
     def change(self, phase: str, search: str, changes: Mapping[str, float]) -> list[float]:
         """Return a printed solution with other values of some variables."""
@@ -120,11 +144,11 @@ class NaoResults:
 
     def list_runs(self, phase: str, search: str) -> list[RunRecord]:
         """Return the runs of a search."""
-        return self.runs[f"nao-{phase}-{self.reading}", self.swarm if search == "PSO" else "ga"]
+        return self.runs[f"nao-{phase}-{self.reading}", self.searches[search]]
 
     def final_powers(self, phase: str, search: str) -> list[float]:
         """Return the power at the end of each run [W]; infinite without a feasible solution."""
-        ends = self.list_runs(phase, search)
+        ends = [run for run in self.list_runs(phase, search)]
         return [end.objective if end.feasible else math.inf for end in ends]
 
 
@@ -133,13 +157,9 @@ def _make_start_tasks(effort: NaoEffort) -> Iterator[Run]:
         for phase in PHASES:
             yield from _start_from_print(make_spec(phase, reading), phase, effort.starts)
         for what, phase in SWEEPS:
-            for spec in list_sweep(reading, what, phase):
-                yield from _start_from_print(spec, phase, min(effort.starts, 1))
-    for share, arms in SHARES:
-        spec = make_spec("dsp", "printed", f"-{share}-{arms}", torso_share=share, arms=arms)
-        mean = evaluate_point(spec, PRINTED_X["dsp", "PSO"])["dbm_y_mean_m"]
-        spec = fix(replace(spec, values={"dbm_y_mean_limit_m": mean}), **{"hip_height_m": 0.31, TIMES["dsp"]: 2.0})
-        yield from _start_from_print(spec, "dsp", min(effort.starts, 1))
+            if what != "gap" or reading == RECONSTRUCTED:
+                for spec in list_sweep(reading, what, phase):
+                    yield from _start_from_print(spec, phase, min(effort.starts, 1))
 
 
 def _start_from_print(spec: ProblemSpec, phase: str, random: int) -> Iterator[Run]:
@@ -152,16 +172,43 @@ def _start_from_print(spec: ProblemSpec, phase: str, random: int) -> Iterator[Ru
 
 
 def compute(runner: Runner, effort: NaoEffort) -> dict[str, NaoResults]:
-    """Return results by reading, and by reading and swarm where there are runs."""
+    """Return results by reading, and by what is compared where there are runs."""
     runs = runner.run_tasks(_make_start_tasks(effort))
-    results = {reading: NaoResults(reading=reading, runs=runs) for reading in READINGS}
+    computed = runner.compute([*_make_computations(effort)])
+    results = {reading: NaoResults(reading=reading, runs=runs, computed=computed) for reading in READINGS}
     if not effort.runs:
         return results
-    algorithms = {name: make_algorithm(name) for name in (*SWARMS.values(), "ga")}
-    specs = [make_spec(phase, reading) for reading in READINGS for phase in PHASES]
-    searches = [make_search_tasks(spec, algorithms, effort.runs, effort.evaluations) for spec in specs]
-    runs |= runner.run_tasks([task for tasks in searches for task in tasks])
-    swarms = {f"{reading}, {label}": (reading, swarm) for reading in READINGS for label, swarm in SWARMS.items()}
-    return results | {
-        name: NaoResults(reading=reading, runs=runs, swarm=swarm) for name, (reading, swarm) in swarms.items()
+    runs |= runner.run_tasks([*_make_search_tasks(effort)])
+    labels = {name: {"PSO": swarm, "GA": ga} for name, (swarm, ga, _) in COMPARED.items()}
+    return results | {name: replace(results[RECONSTRUCTED], searches=chosen) for name, chosen in labels.items()}
+
+
+def _make_search_tasks(effort: NaoEffort) -> Iterator[Run]:
+    main = {name: make_algorithm(name) for name in ("pso", "pso-constant", "ga")}
+    others = {
+        "ga-crossed": GeneticAlgorithm(crossover=SimulatedBinary(probability=1.0)),
+        "ga-elite": GeneticAlgorithm(survival="generational"),
+        "ga-generational": GeneticAlgorithm(survival="generational", elites=0),
     }
+    for phase in PHASES:
+        spec = make_spec(phase, RECONSTRUCTED)
+        yield from make_search_tasks(spec, main, effort.runs, effort.evaluations)
+        yield from make_search_tasks(spec, others, effort.variant_runs, effort.evaluations)
+        for task in make_search_tasks(spec, {"ga-penalty": main["ga"]}, effort.variant_runs, effort.evaluations):
+            yield replace(task, handling=Handling(name="penalty", settings={"weight": PENALTY_W}))
+
+
+def _make_computations(effort: NaoEffort) -> Iterator[tuple[str, Computation]]:
+    """Yield simulations of the printed solutions, and clouds of all gaits that a search finds."""
+    for phase in PHASES:
+        spec = make_spec(phase, RECONSTRUCTED)
+        for search in SEARCHES:
+            x = PRINTED_X[phase, search]
+            yield make_computation(f"simulation-{phase}-{search}", spec, partial(simulate_point, spec), x=x)
+        for search, algorithm in (("PSO", "pso"), ("GA", "ga")):
+            function = partial(collect_cloud, spec)
+            arguments = {"algorithm": algorithm, "evaluations": effort.evaluations}
+            yield make_computation(f"cloud-{phase}-{search}", spec, function, **arguments)
+        if effort.runs:
+            settings = {"runs": effort.variant_runs, "evaluations": effort.evaluations}
+            yield make_computation(f"asynchronous-{phase}", spec, partial(swarm.run_asynchronous, spec), **settings)

@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from compare.drawing.figures import COLOURS, make_axes
+from compare.papers.nao.figures import draw_figures, draw_gait
 from compare.papers.nao.results import (
     FOLDER,
     INDEXES,
     KINDS,
     MARGINS,
     PHASES,
+    PHYSICAL,
     PRINTED,
+    PRINTED_OPTIONS,
     PRINTED_X,
-    READINGS,
+    RECONSTRUCTED,
     SEARCHES,
-    SHARES,
     NaoResults,
     make_spec,
 )
 from compare.papers.paper import read_rows
 from compare.papers.paper_runs import evaluate_point, tabulate
-from compare.report.document import Figure, Part, Prose, Section, Table, Value
-
-JOINTS = ("HipYawPitch", "Hip", "Knee", "Ankle")
+from compare.report.document import Part, Prose, Section, Table, Value
 
 
 def list_margins(result: NaoResults, phase: str, indexes: Sequence[str] = MARGINS) -> list[float]:
@@ -56,29 +56,46 @@ def compute_powers(
 
 
 def show(results: Mapping[str, NaoResults]) -> list[Part]:
-    """Return what stays unexplained, Tables 6 to 9 next to ours in both readings, and causes that are refuted."""
-    causes = (
-        "A cause has to give the printed row. The print refutes a wrong time step, and mechanical power of the legs that counts "
-        "more than once. A constant, the arms and the heat of the legs would fit, but nothing in the text calls for them.",
-        tabulate_causes(results["printed"]),
-    )
+    """Return gaits, figures and Tables 6 to 9 next to ours, and what stays unexplained."""
+    result = results[RECONSTRUCTED]
+    others = [tabulate_others(results, phase) for phase in PHASES]
     return [
-        Prose(explain(results["printed"])),
-        *(tabulate_phase(results, phase) for phase in PHASES),
-        tabulate_swings(results["printed"]),
-        tabulate_shares(results["printed"]),
-        draw(results),
-        Section(title="Causes of the missing power, against the print", parts=causes, folded=True),
+        draw_gait(result),
+        Section(title="Figures of the paper, from our computation", parts=draw_figures(results)),
+        Section(
+            title="Tables 6 to 9", parts=[*(tabulate_phase(result, phase) for phase in PHASES), tabulate_swings(result)]
+        ),
+        Section(title="How the reading was found, and what stays unexplained", parts=[Prose(explain(results))]),
+        Section(title="The printed solutions in the physical reading, and of other robots", parts=others, folded=True),
     ]
 
 
-def explain(result: NaoResults) -> str:
-    """Return what stays unexplained."""
+def explain(results: Mapping[str, NaoResults]) -> str:
+    """Return how the reading was found, and what stays unexplained."""
+    result, errors = results[RECONSTRUCTED], dict[str, float]()
+    readings: dict[str, Mapping[str, Any]] = {
+        "physical gravity and ten intervals": {},
+        "ten samples alone": {"intervals": 9},
+        "the sign of g alone": {"zmp_gravity": "printed"},
+        "both": PRINTED_OPTIONS,
+    }
+    for words, options in readings.items():
+        spec = make_spec("ssp", PHYSICAL, **options)
+        points = {search: evaluate_point(spec, PRINTED_X["ssp", search]) for search in SEARCHES}
+        errors[words] = max(
+            1000 * abs(points[s][index] - PRINTED["ssp", s][index]) for s in SEARCHES for index in MARGINS
+        )
     missing = [PRINTED["ssp", s]["power_W"] - result.measure("ssp", s)["power_W"] for s in SEARCHES]
     torques = [list_levels(result, "dsp", "torque"), [PRINTED["dsp", s]["torque_change_Nm"] for s in SEARCHES]]
     here, printed = (" / ".join(f"{value:.3f}" for value in values) for values in torques)
     means = list_errors(result, "dsp")[2:4]
+    found = ", ".join(f"{error:.2f} mm ({words})" for words, error in errors.items())
     return (
+        "**The reading.** (27) makes g a vector that points down; (19) and (20) subtract a number g, and a cycle is divided into "
+        "ten parts, whose samples may be ten or eleven. All four combinations were evaluated at the print; the largest "
+        f"error of the eight printed margins of single support is {found}. So the authors computed with ten samples and with "
+        "g = +9.8 in the ZMP alone, which turns the sign of its inertial term; their torques have physical gravity. This is a "
+        "reconstruction: no reading of the print alone gives it. Its formula is in `docs/model/balance.md`.\n\n"
         f"**Unexplained.** Power of single support is {missing[0]:.3f} W (PSO) and {missing[1]:.3f} W (GA) below the print, "
         "nearly a constant, which touches no optimum or ranking. Torque change of double support is "
         f"{here} Nm (PSO / GA) for {printed} Nm in print; its mean margins differ by {means[0]:+.1f} and {means[1]:+.1f} mm (x, "
@@ -86,24 +103,42 @@ def explain(result: NaoResults) -> str:
     )
 
 
-def tabulate_phase(results: Mapping[str, NaoResults], phase: str) -> Table:
-    """Return variables and figures of a phase: printed, of the printed solutions here, and of IPOPT's optima."""
-    names, columns = make_spec(phase, "physical").load().names, dict[str, Mapping[str, float]]()
-    for search in SEARCHES:
-        x = PRINTED_X[phase, search]
-        columns[f"{search}, paper"] = {**dict(zip(names, x, strict=True)), **PRINTED[phase, search]}
-        for reading in READINGS:
-            columns[f"{search}, {reading} reading"] = results[reading].measure(phase, search)
-        for robot in ("v4", "v6"):
-            spec = make_spec(phase, "printed", robot=f"nao-{robot}")
-            columns[f"{search}, printed reading, {robot.upper()}"] = evaluate_point(spec, x)
-    for reading in READINGS:
-        best = results[reading].best(make_spec(phase, reading))
-        columns[f"IPOPT, {reading} reading"] = {**best.x, **best.metrics}
-    rows = [{"": name, **{title: c.get(name) for title, c in columns.items()}} for name in (*names, *INDEXES)]
+def tabulate_phase(result: NaoResults, phase: str) -> Table:
+    """Return variables and figures of the printed solutions, in print and here, and of IPOPT's optimum."""
+    spec = make_spec(phase, result.reading)
+    best = result.best(spec)
+    values = {**best.x, **best.metrics}
+    rows = list[Mapping[str, Value]]()
+    for k, name in enumerate(spec.load().names):
+        x = {search: PRINTED_X[phase, search][k] for search in SEARCHES}
+        printed = {"PSO print": x["PSO"], "PSO here": None, "GA print": x["GA"], "GA here": None}
+        rows.append({"": name, **printed, "optimum": values[name]})
+    for name in INDEXES:
+        pairs: dict[str, Value] = {}
+        for search in SEARCHES:
+            pairs |= {
+                f"{search} print": PRINTED[phase, search][name],
+                f"{search} here": result.measure(phase, search)[name],
+            }
+        rows.append({"": name, **pairs, "optimum": values[name]})
     numbers = {"ssp": (6, 7), "dsp": (8, 9)}[phase]
-    caption = f"Tables {numbers[0]} and {numbers[1]}, {PHASES[phase]}: variables, and figures of the same gait"
-    return tabulate(f"table{numbers[1]}", caption, rows)
+    return tabulate(f"table{numbers[1]}", f"Tables {numbers[0]} and {numbers[1]}, {PHASES[phase]}", rows)
+
+
+def tabulate_others(results: Mapping[str, NaoResults], phase: str) -> Table:
+    """Return figures of the printed solutions in the physical reading, and of other robots."""
+    columns = dict[str, Mapping[str, float]]()
+    for search in SEARCHES:
+        columns[f"{search}, physical"] = results[PHYSICAL].measure(phase, search)
+        for robot in ("v4", "v6"):
+            spec = make_spec(phase, RECONSTRUCTED, robot=f"nao-{robot}")
+            columns[f"{search}, {robot.upper()}"] = evaluate_point(spec, PRINTED_X[phase, search])
+    rows: list[Mapping[str, Value]] = [
+        {"": name, **{title: c[name] for title, c in columns.items()}} for name in INDEXES
+    ]
+    return tabulate(
+        f"other-{phase}", f"Printed solutions of {PHASES[phase]}; V4 and V6 in the reconstructed reading", rows
+    )
 
 
 def tabulate_swings(result: NaoResults) -> Table:
@@ -111,64 +146,9 @@ def tabulate_swings(result: NaoResults) -> Table:
     rows = []
     for row in read_rows(FOLDER / "swing_heights.csv"):
         height, printed = float(row["swing_height_m"]), {search: float(row[f"{search}_W"]) for search in SEARCHES}
-        here = {search: result.measure("ssp", search, swing_height_m=height)["power_W"] for search in SEARCHES}
-        paper = {f"{search}, paper [W]": value for search, value in printed.items()}
-        ours = {f"{search}'s solution [W]": value for search, value in here.items()}
-        missing = {f"{search} missing [W]": value - here[search] for search, value in printed.items()}
-        rows.append({"swing height [m]": height, **paper, **ours, **missing})
+        pairs: dict[str, Value] = {"swing height [m]": height}
+        for search, value in printed.items():
+            here = result.measure("ssp", search, swing_height_m=height)["power_W"]
+            pairs |= {f"{search} print [W]": value, f"{search} here [W]": here}
+        rows.append(pairs)
     return tabulate("table7-swing-heights", "Table 7, rows 6 to 11; the printed solutions raised", rows)
-
-
-def tabulate_shares(result: NaoResults) -> Table:
-    """Return PSO's printed double support against the optimum, by share of the torso and who carries the arms."""
-    rows = []
-    for share, arms in SHARES:
-        spec = make_spec("dsp", "printed", f"-{share}-{arms}", torso_share=share, arms=arms)
-        power, best = evaluate_point(spec, PRINTED_X["dsp", "PSO"])["power_W"], result.best(spec)
-        excess = 100 * (power / best.objective - 1) if best.feasible else None
-        words = {"share of the torso": share, "arms": arms}
-        rows.append({**words, "PSO's solution [W]": power, "above the optimum [%]": excess})
-    caption = "Double support: hip and time of the print, mean y margin at least that of the printed solution"
-    return tabulate("shares", caption, rows)
-
-
-def tabulate_causes(result: NaoResults) -> Table:
-    """Return what each supposed cause of the missing power of single support gives, next to the print."""
-    swings = {float(row["swing_height_m"]): float(row["PSO_W"]) for row in read_rows(FOLDER / "swing_heights.csv")}
-    gaits = {"PSO": ("PSO", 0.015), "GA": ("GA", 0.015), "0.018": ("PSO", 0.018), "0.022": ("PSO", 0.022)}
-    drawn = {name: compute_powers(result, search, swing_height_m=height) for name, (search, height) in gaits.items()}
-    printed = {"PSO": swings[0.015], "GA": PRINTED["ssp", "GA"]["power_W"]}
-    printed |= {name: swings[float(name)] for name in ("0.018", "0.022")}
-    rows = list[Mapping[str, Value]]()
-    for cause in [{"cause": "printed"}, *read_rows(FOLDER / "causes.csv")]:
-        powers = printed
-        if cause["cause"] != "printed":
-            powers = {name: _weigh(cause, *parts) for name, parts in drawn.items()}
-        excess = {name: 1000 * (power - powers["PSO"]) for name, power in powers.items() if name != "PSO"}
-        titles = {"GA": "GA more than PSO [mW]", "0.018": "swing height 18 mm [mW]", "0.022": "swing height 22 mm [mW]"}
-        rows.append({"cause": cause["cause"], "PSO [W]": powers["PSO"], **{titles[n]: v for n, v in excess.items()}})
-    return tabulate("causes", "", rows)
-
-
-def _weigh(cause: Mapping[str, str], mechanical: Mapping[str, float], heat: Mapping[str, float]) -> float:
-    total = 0.0
-    for joint, power in mechanical.items():
-        leg = any(joint[1:].startswith(kind) for kind in JOINTS)
-        group = ("support" if joint[0] == "L" else "swing") if leg else "arms"
-        total += float(cause[group]) * power + float(cause["leg_heat" if leg else "arm_heat"]) * heat[joint]
-    return total
-
-
-def draw(results: Mapping[str, NaoResults]) -> Figure:
-    """Return the errors of all printed margins in both readings."""
-    figure, axes = make_axes(6.0, 3.0)
-    for (reading, colour), offset in zip((("printed", "ga"), ("physical", "pso")), (-0.2, 0.2), strict=True):
-        errors = [error for phase in PHASES for error in list_errors(results[reading], phase)]
-        axes.bar(np.arange(len(errors)) + offset, errors, 0.4, color=COLOURS[colour], label=f"{reading} reading")
-    kinds = [f"{'least' if 'min' in index else 'mean'} {index[4]}" for index in MARGINS]
-    labels = [f"{phase} {search}\n{kind}" for phase in PHASES for search in SEARCHES for kind in kinds]
-    axes.set_xticks(range(len(labels)), labels, rotation=90, fontsize="x-small")
-    axes.set(ylabel="error of the margin [mm]")
-    axes.legend()
-    caption = "Margins of the printed solutions here, less the printed ones"
-    return Figure(name="margins", caption=caption, drawing=figure)

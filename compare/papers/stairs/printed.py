@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,19 +13,17 @@ import numpy as np
 
 from compare.papers.paper import read_rows
 from compare.study.run import ProblemSpec
-from nlp_gait.formulation import Array, Result, Signals
+from nlp_gait.formulation import Array, Signals
 from nlp_gait.formulation.display import LEFT, RIGHT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop, N, measure_joints
 from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkSettings, compute_leg_vector, make_training_path
-from nlp_gait.gaits.stairs.planar_biped import GRAVITY, get_rod, load_toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, get_rod, load_toe_foot_biped, make_dynamics
 from nlp_gait.gaits.stairs.stair import SETBACK
 from nlp_gait.symbolic.nonsmooth import Exact
 
 DENSITY = 5  # samples of a measured plan, as a multiple of the problem's own
-LANDED, RISEN = (
-    50.0,
-    90.0,
-)  # a climb lands within this share of a tread, and the hip rises by this share of the rise [%]
+# A climb lands within this share of a tread, and the hip rises by this share of the rise [%].
+LANDED, RISEN = 50.0, 90.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,21 +93,34 @@ def measure_equations(case: Case) -> dict[str, dict[str, float]]:
             "jump of the ankle's speed at t2 [m/s]": 3 * float(np.linalg.norm(points[1] - points[0])) / (t_bc - t2),
         },
         "arc": {"hip above its place [m]": tread / math.sin(2 * math.atan2(rise, tread))},  # (eq. 25)
-        "flat-stairs": {
-            "ankle inside a step of 10 cm on 30 cm [mm]": measure_slide(0.30, 0.10),
-            "inside one of Table IV [mm]": max(measure_slide(*row.step_m) for row in TABLE_4.values()),
-        },
         "end-rate": {"landing of the ankle [m/s]": 2 * rise * math.sqrt(GRAVITY / rise)},
+        "cubic": _measure_cubic(rise, 3 * catch / (t_bc - t2), first + 2 * catch, t_bc),
     }
 
 
-def measure_slide(tread: float, rise: float) -> float:
-    """Return how deep the printed ankle is inside the first step of a flat stair at its edge, by (8), (9) [mm]."""
-    if math.pi * rise >= 2 * tread:
-        return 0.0
-    angle = _find_cycloid_angle(rise, tread - SETBACK - (2 * tread - math.pi * rise))  # at the edge
-    lift = load_toe_foot_biped().toe_m * math.sin(TABLE_3["toe_angle_rad"])
-    return 1e3 * max(rise - lift - rise * (1 - math.cos(angle)), 0.0)
+def _measure_cubic(radius: float, rate: float, first: float, t_bc: float) -> dict[str, float]:
+    """Return how far the angle of (13), (14) runs backwards from where the cycloid is caught at a rate [rad, rad/s]."""
+    end, t3 = math.sqrt(GRAVITY / radius), TABLE_3["t3_s"]
+    rows = [[t**n for n in range(4)] for t in (t_bc, t3)] + [
+        [n * t ** max(n - 1, 0) for n in range(4)] for t in (t_bc, t3)
+    ]
+    times = np.linspace(t_bc, t3, 1001)
+    angle = np.linalg.solve(np.array(rows), [first, math.pi, rate, end]) @ times ** np.arange(4)[:, None]
+    return {"angle where the cycloid is caught [rad]": first, "least angle afterwards [rad]": float(angle.min())}
+
+
+def measure_dynamics(postures: int = 20) -> tuple[float, float]:
+    """Return the least eigenvalue of M over its largest, and how far dM/dt - 2 C is from skew, at random postures."""
+    q, v, rng = ca.SX.sym("q", N), ca.SX.sym("v", N), np.random.default_rng(0)
+    motion = make_dynamics(q, v, q, "H")
+    rate = ca.reshape(ca.jtimes(ca.vec(motion.M), q, v), N, N) - 2 * motion.C
+    function = ca.Function("dynamics", [q, v], [motion.M, rate + rate.T])
+    least, skew = math.inf, 0.0
+    for _ in range(postures):
+        M, symmetric = (np.array(value) for value in function(rng.uniform(-np.pi, np.pi, N), rng.uniform(-3, 3, N)))
+        eigenvalues = np.linalg.eigvalsh(M)
+        least, skew = min(least, eigenvalues[0] / eigenvalues[-1]), max(skew, float(np.abs(symmetric).max()))
+    return least, skew
 
 
 def _find_cycloid_angle(radius: float, x: float) -> float:
@@ -170,50 +180,29 @@ def train_network(
         reached, errors, steps = (np.array(values) for values in train(settings.first_weights, unit * legs))
         off = np.abs((reached.T - angles + np.pi) % (2 * np.pi) - np.pi)
         converged = errors[0] <= settings.tolerance_m2
-        numbers: dict[str, float | None] = {
+        numbers: dict[str, Any] = {
             "converged_%": 100 * float(converged.mean()),
             "later_converged_%": 100 * float(converged[1:].mean()),
         }
         numbers |= {"first_steps": float(steps[0, 0]), "later_steps": float(np.median(steps[0, 1:]))}
         numbers["largest_error_rad"] = float(off.max()) if np.isfinite(off).all() else None
+        numbers["steps"] = steps[0].tolist()
         rows.append(numbers)
     return rows
 
 
-def simulate_climb(spec: ProblemSpec, x: Mapping[str, float]) -> dict[str, float | None]:
-    """Return what the engine makes of a plan: landing error as share of the tread, rise of the hip as share of the rise [%].
-
-    Also the slip of the stance foot [m], the time of a fall [s], None without one, and the energy of the drives [J]; nothing
-    without MuJoCo.
-    """
-    if find_spec("mujoco") is None:
-        return {}
-    from nlp_gait.simulation.drive import Drive
-    from nlp_gait.simulation.measurements import measure
-    from nlp_gait.simulation.plan import make_plan
-    from nlp_gait.simulation.simulate import simulate_plan
-
-    problem = spec.load()
-    tread = problem.value("stair_length_m") / 2
-    plan = make_plan(Result(problem=problem, x=problem.check_x(x)))
-    simulation = simulate_plan(plan)
-    measured = measure(plan, simulation, Drive())
-    risen = float(simulation.torso[-1, 2] - simulation.torso[0, 2])
-    return {
-        "landing_%": 100 * measured.landings["right"].error_m / tread,
-        "risen_%": 100 * risen / (tread * problem.value("rise_run_ratio")),
-        "slip_m": measured.slip_m,
-        "fell_at_s": measured.fell_at_s,
-        "energy_J": measured.measured.mechanical_W * plan.duration_s,
-    }
+def measure_climb(case: Case, climb: Mapping[str, float]) -> tuple[float, float]:
+    """Return the landing error as share of the tread, and the rise of the hip as share of the rise [%]."""
+    tread, rise = case.step_m
+    return 100 * climb["landing_m"] / tread, 100 * climb["rise_m"] / rise
 
 
-def describe_climb(climb: Mapping[str, float | None]) -> str:
+def describe_climb(case: Case, climb: Mapping[str, Any]) -> str:
     """Return the result of a simulation in words: a climb lands on its step and rises by it."""
     if not climb:
         return "not simulated: MuJoCo is not installed"
     if climb["fell_at_s"] is not None:
         return f"falls at {climb['fell_at_s']:.1f} s"
-    landing, risen = climb["landing_%"] or 0.0, climb["risen_%"] or 0.0
+    landing, risen = measure_climb(case, climb)
     words = "climbs" if landing < LANDED and risen > RISEN else "stays up, but does not climb"
     return f"{words}: lands {landing:.0f} % of a tread off, the hip rises by {risen:.0f} % of the rise"

@@ -20,9 +20,10 @@ from compare.papers.paper_runs import (
     make_computation,
     make_search_tasks,
     make_start_tasks,
+    simulate_point,
 )
 from compare.papers.stairs import printed
-from compare.papers.stairs.printed import FOLDER, TABLE_3, TABLE_4
+from compare.papers.stairs.printed import FOLDER, TABLE_4
 from compare.study.memo import Computation
 from compare.study.record import RunRecord
 from compare.study.run import IPOPT, ProblemSpec, Run
@@ -33,15 +34,14 @@ from nlp_gait.gaits.stairs.track import PLAN
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 PLANS = {"least jerk": "jerk", "least energy": "energy"}  # readings of claims on plans
-INDEXES = {"jerk": ("peak_jerk_rad_s3", "rad/s³"), "energy": ("energy_J", "J")}
 TRACKINGS = {row["name"]: row for row in read_rows(FOLDER / "readings.csv")}  # of the tracked step
-LITERAL = "as printed"
+LITERAL, NETWORK = "as printed", "network"
 DRAWN_CASE = 2
 # Choices of the planner that are undone one by one: their options are in differences.csv.
 CHOICES = {
     row["id"]: parse_settings(row["option"])
     for row in read_rows(FOLDER / "differences.csv")
-    if row["id"] in ("end-rate", "straight", "torso", "times", "shanks", "hull", "edges")
+    if row["id"] in ("end-rate", "straight", "torso", "times", "shanks", "hull", "edges", "hip-height")
 }
 ANTS, ITERATIONS = 30, 100  # Table IV
 COLONY = AntColony(population=ANTS, spread=0.7)  # of the printed evaporation; the paper defines none for real numbers
@@ -52,27 +52,16 @@ NETWORK_RATES = {
 }
 # Fast for one solve from near the optimum; compiled and with exact derivatives a plan takes twice as long.
 NEAR_OPTIMUM = {"compiled": False, "hessian": "limited-memory"}
-TRACK_START = {"kp": 40.0, "kd": 6.0, "torso_pitch_rad": 1.58}
-HIP_M = TABLE_3["hip_height_m"]
-NO_LIMITS = {"acceleration_limit_rad_s2": 1e6, "zmp_margin_m": 0.0, "clearance_m": 0.0, "friction": 100.0}
-NO_LIMITS |= {
-    "least_stance_force_N": 0.0,
-    "reach_margin": 1e-4,
-    "hip_height_m.lower": HIP_M,
-    "hip_height_m.upper": HIP_M,
-}
 
 
 @dataclass(frozen=True, kw_only=True)
 class StairsEffort(Effort):
     """Effort of the reproduction."""
 
-    runs: int = 3  # of the colony on each reading of the tracked step
+    runs: int = 5  # of the colony on each reading of the tracked step, at most as many as readings.csv says
     evaluations: int = ANTS * ITERATIONS  # of a run, as in the paper
-    starts: int = 2  # of IPOPT on each plan, one of them near our best known plan; of the printed hip height
+    starts: int = 1  # of IPOPT on each plan, the first one near our best known plan
     poses: int = 350  # of the network, every 0.01 s
-    track_s: float = 3.5  # of the tracked steps that IPOPT solves
-    track_cases: tuple[int, ...] = tuple(TABLE_4)  # that IPOPT solves, in the literal reading
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,6 +102,11 @@ class StairsResults:
         """The colony's best tracked steps by case."""
         return [choose_best(self.runs[make_title(self.tracking, case), "aco"]) for case in TABLE_4]
 
+    def list_ends(self, name: str) -> list[list[float]]:
+        """Return a tuned value or an index at the ends of all feasible runs of the colony, by case."""
+        runs = [self.runs[make_title(self.tracking, case), "aco"] for case in TABLE_4]
+        return [[{**run.x, **run.metrics}[name] for run in of_case if run.feasible] for of_case in runs]
+
     def list_tracked(self, name: str) -> list[float]:
         """Return a tuned value or an index of the tracked steps of all cases."""
         return [{**run.x, **run.metrics}[name] for run in self.tracked]
@@ -120,7 +114,7 @@ class StairsResults:
 
 def make_plan_spec(plan: str, case: int, label: str = "", **options: Any) -> ProblemSpec:
     """Return the planner of a case, of least jerk or energy."""
-    options = {"minimise": plan, **options}
+    options = {"minimise": plan, "shanks": "limited", **options}
     return ProblemSpec(name="stairs-plan", options=options, values=TABLE_4[case].stair, label=label or f"{plan}-{case}")
 
 
@@ -133,8 +127,8 @@ def make_track_spec(case: int, plan: Mapping[str, float], tracking: str = "", **
     )
 
 
-def make_title(tracking: str, case: int) -> str:
-    """Return the label of a tracked step."""
+def make_title(tracking: str, case: int | str = "all") -> str:
+    """Return the label of a tracked step, or of those of all cases."""
     return f"track-{tracking.replace(' ', '-').replace(',', '')}-{case}"
 
 
@@ -142,14 +136,17 @@ def compute(runner: Runner, effort: StairsEffort) -> dict[str, StairsResults]:
     """Plan all steps; then undo choices of the planner, simulate the plans, and track them."""
     runs = runner.run_tasks(_make_plan_tasks(effort))
     plans = {plan: StairsResults(plan=plan, runs=runs, computed={}) for plan in PLANS.values()}
-    tasks = [*_make_track_tasks(effort, plans), *(_make_choice_tasks(effort, plans) if effort.runs else ())]
+    tasks = [
+        *_make_track_tasks(effort, plans),
+        *(_make_choice_tasks(plans["jerk"].best(DRAWN_CASE)) if effort.runs else ()),
+    ]
     runs |= runner.run_tasks(tasks)
-    computed = runner.compute(_make_computations(effort, plans))
+    computed = runner.compute([*_make_computations(effort, plans)])
     results = {reading: StairsResults(plan=plan, runs=runs, computed=computed) for reading, plan in PLANS.items()}
     if effort.runs:
         for name, row in TRACKINGS.items():
             results[name] = StairsResults(plan=row["plan"], runs=runs, computed=computed, tracking=name)
-        again = runner.compute(_make_power_computations(effort, results))
+        again = runner.compute([*_make_power_computations(effort, results)])
         results = {name: replace(result, computed={**computed, **again}) for name, result in results.items()}
     return results
 
@@ -163,15 +160,11 @@ def _make_plan_tasks(effort: StairsEffort) -> Iterator[Run]:
             yield replace(task, number=task.number + 1)
 
 
-def _make_choice_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[Run]:
-    """Yield plans of case 2 under each choice, from ours, and plans with the printed hip height without our limits."""
+def _make_choice_tasks(best: RunRecord) -> Iterator[Run]:
+    """Yield plans of least jerk of case 2 under each choice, from ours."""
     for name, (options, values) in CHOICES.items():
-        for plan, result in plans.items():
-            spec = make_plan_spec(plan, DRAWN_CASE, label=f"{plan}-{name}", **options)
-            yield _start_near(replace(spec, values={**spec.values, **values}), result.best(DRAWN_CASE))
-    for case in TABLE_4:
-        spec = make_plan_spec("energy", case, label=f"hip-{case}", balance="polygon", angle_limits=False)
-        yield from make_start_tasks(replace(spec, values={**spec.values, **NO_LIMITS}), effort.starts)
+        spec = make_plan_spec("jerk", DRAWN_CASE, label=f"jerk-{name}", **options)
+        yield _start_near(replace(spec, values={**spec.values, **values}), best)
 
 
 def _start_near(spec: ProblemSpec, best: RunRecord) -> Run:
@@ -185,19 +178,15 @@ def _make_track_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults]) 
     for name, row in TRACKINGS.items():
         for case in TABLE_4:
             spec = make_track_spec(case, plans[row["plan"]].best(case).x, name)
-            yield from make_search_tasks(spec, {"aco": COLONY}, effort.runs, effort.evaluations)
-            if name == LITERAL and case in effort.track_cases:
-                label = spec.label if effort.runs else f"{spec.label}-short"
-                spec = replace(spec, options={**spec.options, "duration_s": effort.track_s}, label=label)
-                settings = {"time_limit_s": 600.0} if effort.runs else NEAR_OPTIMUM  # compiling pays for a whole step
-                yield Run(problem=spec, solver=IPOPT, settings=settings, start=TRACK_START)
+            runs = min(effort.runs, int(row["runs"]))
+            yield from make_search_tasks(spec, {"aco": COLONY}, runs, effort.evaluations)
 
 
 def _make_computations(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[tuple[str, Computation]]:
     for plan, result in plans.items():
         for case in TABLE_4:
             spec, x = make_plan_spec(plan, case), dict(result.best(case).x)
-            yield make_computation(f"climb-{plan}-{case}", spec, partial(printed.simulate_climb, spec), x=x)
+            yield make_computation(f"climb-{plan}-{case}", spec, partial(simulate_point, spec), x=list(x.values()))
         first = result.best(1).x
         track, rates = make_track_spec(1, first), [*NETWORK_RATES.values()]
         settings = {"torso_pitch_rad": first["torso_pitch_rad"], "rates": rates, "poses": effort.poses}
@@ -215,7 +204,7 @@ def _make_power_computations(
 
 
 def tune_otherwise(spec: ProblemSpec, x: Sequence[float], evaluations: int) -> dict[str, float]:
-    """Return the energies of the gains tuned without the power in (53), and of the gains x with an upright torso [J]."""
+    """Return the energies of gains tuned without the power in (53), and of x with an upright torso [J]; its least margin [m]."""
     problem = spec.load()
 
     def drop_power(assembly: Assembly, point: Point, _: Nonsmooth) -> Assembly:
@@ -224,5 +213,7 @@ def tune_otherwise(spec: ProblemSpec, x: Sequence[float], evaluations: int) -> d
 
     objective = compile_objective(problem.derive(name="stairs-errors", change=drop_power), threads=1)
     tuned = minimize(objective, COLONY, evaluations=evaluations, seed=0).x
-    points = {"without_power_J": tuned.tolist(), "upright_J": [*x[:2], np.pi / 2]}
-    return {name: float(evaluate(problem, point).indexes["energy_J"]) for name, point in points.items()}
+    points = {"without_power": tuned.tolist(), "upright": [*x[:2], np.pi / 2]}
+    indexes = {name: evaluate(problem, point).indexes for name, point in points.items()}
+    numbers = {f"{name}_J": float(found["energy_J"]) for name, found in indexes.items()}
+    return numbers | {"upright_margin_m": float(indexes["upright"]["zmp_margin_min_m"])}

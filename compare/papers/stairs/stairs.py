@@ -6,22 +6,19 @@ hip is the base, so that something else carries the robot.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import Any
 
-import numpy as np
-
-from compare.drawing.figures import make_figure
 from compare.papers.paper import Paper, read_book
-from compare.papers.paper_runs import choose_best, evaluate_point, tabulate
+from compare.papers.paper_runs import evaluate_point, read_objective, tabulate
 from compare.papers.stairs import printed
+from compare.papers.stairs.figures import draw_figures, draw_gait
 from compare.papers.stairs.printed import TABLE_3, TABLE_4, describe_climb, measure_equations
 from compare.papers.stairs.results import (
     CHOICES,
     DRAWN_CASE,
-    INDEXES,
     LITERAL,
-    NETWORK_RATES,
     PLANS,
     TRACKINGS,
     StairsEffort,
@@ -31,11 +28,10 @@ from compare.papers.stairs.results import (
     make_title,
     make_track_spec,
 )
-from compare.report.document import Figure, Part, Table, Value
+from compare.report.document import Part, Prose, Section, Table, Value
 from compare.study.run import IPOPT
-from nlp_gait.formulation.display import LEFT, RIGHT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
-from nlp_gait.gaits.stairs.stair import SETBACK
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, load_toe_foot_biped
 
 BOOK = read_book(__file__)
 
@@ -76,10 +72,47 @@ def list_depths(results: StairsResults) -> list[float]:
     return [depth for of_all_cases in zip(*depths, strict=True) for depth in of_all_cases]
 
 
-def list_climbs(results: StairsResults, key: str) -> list[float] | None:
-    """Return a number of the simulated plans by case; None without MuJoCo."""
+def list_climbs(results: StairsResults, which: int) -> list[float] | None:
+    """Return landing errors (0) or rises of the hip (1) of the simulated plans by case [%]; None without MuJoCo."""
     climbs = results.list_computed("climb")
-    return [climb[key] for climb in climbs] if all(climbs) else None
+    pairs = zip(TABLE_4.values(), climbs, strict=True)
+    return [printed.measure_climb(case, climb)[which] for case, climb in pairs] if all(climbs) else None
+
+
+def require_feasible(function: Callable[[StairsResults], Any]) -> Callable[[StairsResults], Any]:
+    """Return a function that gives None where the colony found no feasible step in a case."""
+    return lambda results: function(results) if all(run.feasible for run in results.tracked) else None
+
+
+def list_run_leads(results: StairsResults, *names: str) -> list[list[float]] | None:
+    """Return leads of case 2 over cases 1 and 3, for all pairs of feasible runs [%]; None if there are none."""
+    leads = []
+    for name in names:
+        ends = results.list_ends(name)
+        leads += [[100 * (a / b - 1) if b else 0.0 for a in ends[k] for b in ends[1]] for k in (0, 2)]
+    fewest = min(map(len, leads))
+    return [row[:fewest] for row in leads] if fewest else None
+
+
+def list_margins(results: StairsResults) -> list[float]:
+    """Return the least ZMP margins of tracked steps with the gains and the torso pitch of Table IV [mm]."""
+    return [1000 * indexes["zmp_margin_min_m"] for indexes in evaluate_printed(results)]
+
+
+def evaluate_printed(results: StairsResults) -> list[Mapping[str, float]]:
+    """Return what tracked steps with the gains and the torso pitch of Table IV are like, by case."""
+    return [
+        evaluate_point(make_track_spec(n, results.best(n).x), [c.kp, c.kd, c.torso_pitch_rad])
+        for n, c in TABLE_4.items()
+    ]
+
+
+def list_steadier(results: StairsResults) -> list[float]:
+    """Return by how much the tuned torso pitch makes the least ZMP margin larger than an upright torso, by case [mm]."""
+    pairs = zip(
+        results.list_tracked("zmp_margin_min_m"), results.list_computed("power", "upright_margin_m"), strict=True
+    )
+    return [1000 * (tuned - upright) for tuned, upright in pairs]
 
 
 def get_network(results: StairsResults) -> dict[str, float]:
@@ -88,136 +121,157 @@ def get_network(results: StairsResults) -> dict[str, float]:
     return network
 
 
-def list_printed_errors(results: StairsResults) -> list[float]:
-    """Return the largest errors of tracked steps with the gains and the torso pitch of Table IV [rad]."""
-    return [
-        evaluate_point(make_track_spec(n, results.best(n).x), [c.kp, c.kd, c.torso_pitch_rad])["largest_error_rad"]
-        for n, c in TABLE_4.items()
-    ]
-
-
 def compute_saving(results: StairsResults, key: str) -> float:
     """Return the energy that the colony's gains save against another choice, over all cases [%]."""
     return 100 * (1 - sum(results.list_tracked("energy_J")) / sum(results.list_computed("power", key)))
 
 
 def compare_choice(results: Mapping[str, StairsResults], name: str) -> dict[str, float | str]:
-    """Return the optima of case 2 with a choice of the planner undone, next to ours."""
-    effects: dict[str, float | str] = {}
-    for reading, plan in PLANS.items():
-        result, (index, unit) = results[reading], INDEXES[plan]
-        (run,), ours = result.runs[f"{plan}-{name}", IPOPT], result.best(DRAWN_CASE).metrics[index]
-        value = run.metrics[index] if run.feasible else f"no plan ({', '.join(run.violated[:1])})"
-        label = f"case {DRAWN_CASE}, {reading}"
-        effects |= {f"{label} [{unit}]": value, f"{label}, ours [{unit}]": ours}
-    return effects
-
-
-def compare_hip_height(results: Mapping[str, StairsResults]) -> dict[str, float | str]:
-    """Return how many starts find a plan with the printed hip, without our limits, and what is violated between samples."""
-    effects: dict[str, float | str] = {}
-    for case in TABLE_4:
-        runs = results["least energy"].runs[f"hip-{case}", IPOPT]
-        effects[f"starts that are feasible at their samples, of {len(runs)}, case {case}"] = sum(
-            run.feasible for run in runs
-        )
-        worst = [*choose_best(runs).violated, "nothing"][0]
-        effects[f"violated between samples, case {case}"] = worst
-    return effects
-
-
-def compare_colony(results: Mapping[str, StairsResults]) -> dict[str, float | str]:
-    """Return how far IPOPT from one start ends above the colony's best run [%], or which row it violates."""
-    result, effects = results[LITERAL], dict[str, float | str]()
-    for case, colony in zip(TABLE_4, result.tracked, strict=True):
-        (run,) = result.runs[make_title(LITERAL, case), IPOPT]
-        excess = 100 * (run.objective / colony.objective - 1)
-        violated = f"no feasible point ({', '.join(run.violated[:1])})"
-        effects[f"IPOPT above the colony's best, case {case} [%]"] = excess if run.feasible else violated
-    return effects
+    """Return the least peak jerk of case 2 with a choice of the planner undone, next to ours [rad/s^3]."""
+    result = results["least jerk"]
+    (run,), ours = result.runs[f"jerk-{name}", IPOPT], result.best(DRAWN_CASE)
+    value = read_objective(run) if run.feasible else f"no plan ({', '.join(run.violated[:1])})"
+    return {f"peak jerk of case {DRAWN_CASE} [rad/s³]": value, "ours [rad/s³]": read_objective(ours)}
 
 
 BOOK.bind(
     {
-        "jerk-t1": lambda r: r.list_plans("t1_s"),
-        "jerk-t2": lambda r: r.list_plans("t2_s"),
-        "jerk-t_bc": lambda r: r.list_plans("t_bc_s"),
+        "jerk-times": lambda r: [t for name in ("t1_s", "t2_s", "t_bc_s") for t in r.list_plans(name)],
         "jerk-terms": lambda r: list_jerk_terms(),
         "peak-acceleration": lambda r: list_peaks(r, 0),
         "peak-jerk": lambda r: list_peaks(r, 1),
         "least-peaks": lambda r: [lead for column in (0, 1) for lead in list_leads(list_peaks(r, column))],
         "reach": list_reaches,
         "collisions": list_depths,
-        "climb-landing": lambda r: list_climbs(r, "landing_%"),
-        "climb-rise": lambda r: list_climbs(r, "risen_%"),
+        "jerk-hip": lambda r: r.list_plans("hip_height_m"),
+        "climb-landing": lambda r: list_climbs(r, 0),
+        "climb-rise": lambda r: list_climbs(r, 1),
+        "seams": lambda r: measure_equations(TABLE_4[DRAWN_CASE])["bezier"]["jump of the ankle's speed at t2 [m/s]"],
+        "mass-matrix": lambda r: printed.measure_dynamics()[0],
+        "skew": lambda r: printed.measure_dynamics()[1],
+        "zmp-printed": list_margins,
         "network": lambda r: get_network(r)["converged_%"],
         "real-time": lambda r: get_network(r)["later_converged_%"],
         "warm-network": lambda r: 100 * get_network(r)["later_steps"] / get_network(r)["first_steps"],
-        "printed-gains": list_printed_errors,
+        "printed-gains": lambda r: [indexes["largest_error_rad"] for indexes in evaluate_printed(r)],
     }
 )
 BOOK.bind(
     {
-        "best-cost": lambda r: list_leads(r.list_tracked("controller_cost")),
-        "best-energy": lambda r: list_leads(r.list_tracked("energy_J")),
-        "best-torque": lambda r: list_leads(r.list_tracked("peak_torque_Nm")),
-        "least-gains": lambda r: [lead for gain in ("kp", "kd") for lead in list_leads(r.list_tracked(gain))],
-        "ratios-cost": lambda r: [1 + lead / 100 for lead in list_leads(r.list_tracked("controller_cost"))],
-        "ratios-torque": lambda r: [1 + lead / 100 for lead in list_leads(r.list_tracked("peak_torque_Nm"))],
-        "track-energy": lambda r: r.list_tracked("energy_J"),
-        "follow": lambda r: r.list_tracked("largest_error_rad"),
-        "torso-energy": lambda r: compute_saving(r, "upright_J"),
-        "power-term": lambda r: compute_saving(r, "without_power_J"),
+        "best-cost": lambda r: list_run_leads(r, "controller_cost"),
+        "best-energy": lambda r: list_run_leads(r, "energy_J"),
+        "best-torque": lambda r: list_run_leads(r, "peak_torque_Nm"),
+        "least-gains": lambda r: list_run_leads(r, "kp", "kd"),
+        "zmp": lambda r: [1000 * margin for margin in r.list_tracked("zmp_margin_min_m")],
+        "torso-stability": require_feasible(list_steadier),
+        "pitch": require_feasible(lambda r: r.list_tracked("torso_pitch_rad")),
+        "ratios-cost": require_feasible(
+            lambda r: [1 + lead / 100 for lead in list_leads(r.list_tracked("controller_cost"))]
+        ),
+        "ratios-torque": require_feasible(
+            lambda r: [1 + lead / 100 for lead in list_leads(r.list_tracked("peak_torque_Nm"))]
+        ),
+        "track-energy": require_feasible(lambda r: r.list_tracked("energy_J")),
+        "follow": require_feasible(lambda r: r.list_tracked("largest_error_rad")),
+        "torso-energy": require_feasible(lambda r: compute_saving(r, "upright_J")),
+        "power-term": require_feasible(lambda r: compute_saving(r, "without_power_J")),
         **{name: partial(compare_choice, name=name) for name in CHOICES},
-        "hip-height": compare_hip_height,
-        "colony": compare_colony,
     },
     runs=True,
 )
-MISSES = ("foot-angles", "bezier", "arc", "flat-stairs")
+MISSES = ("foot-angles", "bezier", "arc", "cubic")
 BOOK.bind({id: lambda results, id=id: measure_equations(TABLE_4[DRAWN_CASE])[id] for id in MISSES})
 
 
 def show(results: Mapping[str, StairsResults]) -> list[Part]:
-    """Return Tables III and IV next to ours, the plans in the engine, the network, and the legs."""
+    """Return gaits, figures, Tables III and IV next to ours, and what carries the robot; then other readings, folded."""
+    others = (*(tabulate_tracked(results, name) for name in TRACKINGS if name in results and name != LITERAL),)
     return [
-        tabulate_plans(results),
-        tabulate_fourth(results),
+        draw_gait(results),
+        Prose(explain(results)),
+        Section(title="Figures of the paper, from our computation", parts=draw_figures(results)),
+        Section(title="Tables III and IV", parts=[tabulate_plans(results["least jerk"]), tabulate_fourth(results)]),
         tabulate_climbs(results),
-        tabulate_network(results),
-        draw(results),
+        *([Section(title="Table IV in other readings", parts=others, folded=True)] if others else []),
     ]
 
 
-def tabulate_plans(results: Mapping[str, StairsResults]) -> Table:
-    """Return Table III next to the plans."""
+def explain(results: Mapping[str, StairsResults]) -> str:
+    """Return what has to be known to read Table IV."""
+    weight = load_toe_foot_biped().mass_kg * GRAVITY
+    lifts = " / ".join(f"{weight * case.step_m[1]:.1f}" for case in TABLE_4.values())
+    words = (
+        f"The three stairs differ in tread and rise, and that of case 2 is the smallest: raising the weight by a step takes "
+        f"{lifts} J, so that the least energy a step says nothing on the ratio of rise and run."
+    )
+    if LITERAL not in results:
+        return words
+    energies = results[LITERAL].list_tracked("energy_J")
+    shown = " / ".join(f"{energy:.1f}" for energy in energies)
+    carried = (
+        "less than that: as the hip is the base, something else carries the robot"
+        if max(energies) < weight * min(case.step_m[1] for case in TABLE_4.values())
+        else "as printed"
+    )
+    metres = " / ".join(
+        f"{energy / case.step_m[1]:.0f}" for energy, case in zip(energies, TABLE_4.values(), strict=True)
+    )
+    return f"{words} The colony's steps as printed need {shown} J, {carried}; by metre of rise {metres} J."
+
+
+def tabulate_plans(result: StairsResults) -> Table:
+    """Return Table III next to the plans of least jerk."""
+    names = dict.fromkeys([*TABLE_3, *result.best(DRAWN_CASE).x])
     rows = list[Mapping[str, Value]]()
-    for name in results["least jerk"].best(DRAWN_CASE).x:
-        row: dict[str, Value] = {"parameter": name, "paper": TABLE_3.get(name)}
-        for reading in PLANS:
-            values = zip(TABLE_4, results[reading].list_plans(name), strict=True)
-            row |= {f"{reading}, case {case}": value for case, value in values}
-        rows.append(row)
-    return tabulate("table3", "Table III and our plans; its torso pitch is in Table IV", rows)
+    for name in names:
+        planned = name in result.best(DRAWN_CASE).x
+        values = {f"here, case {case}": result.best(case).x[name] if planned else None for case in TABLE_4}
+        rows.append({"parameter": name, "print": TABLE_3.get(name), **values})
+    caption = (
+        "Table III and our plans of least jerk; torso pitch is in Table IV, t3 and the angles are as printed, and no equation "
+        "has t1_passive and t2_passive (t1^p, t2^p)"
+    )
+    return tabulate("table3", caption, rows)
 
 
 def tabulate_fourth(results: Mapping[str, StairsResults]) -> Table:
-    """Return Table IV next to the plans and the colony's tracked steps in all readings."""
-    rows = [_compare(name, "least jerk", list_peaks(results["least jerk"], k)) for k, name in enumerate(PEAKS)]
-    indexes = {"cost": "controller_cost", "energy": "energy_J"}
-    for quantity in ("torso_pitch_rad", "kp", "kd", "cost", "energy", "peak_torque_Nm"):
-        for name in (name for name in TRACKINGS if name in results):
-            rows.append(_compare(quantity, name, results[name].list_tracked(indexes.get(quantity, quantity))))
-    return tabulate("table4", "Table IV; cost: the mean of (53), energy here in J", rows)
+    """Return Table IV next to the plans and the colony's tracked steps as printed."""
+    ours = {name: list_peaks(results["least jerk"], k) for k, name in enumerate(PEAKS)}
+    if LITERAL in results:
+        ours |= {name: results[LITERAL].list_tracked(INDEX_NAMES.get(name, name)) for name in TRACKED}
+    rows = list[Mapping[str, Value]]()
+    for name in (*PEAKS, *TRACKED):
+        row: dict[str, Value] = {f"print {n}": getattr(case, name) for n, case in TABLE_4.items()}
+        rows.append(
+            {
+                "": name,
+                **row,
+                **{f"here {n}": value for n, value in zip(TABLE_4, ours.get(name, [None] * 3), strict=True)},
+            }
+        )
+    return tabulate(
+        "table4",
+        "Table IV, cases 1, 2, 3; cost: mean of (53), energy here in J; where no run is feasible, of the least infeasible",
+        rows,
+    )
+
+
+def tabulate_tracked(results: Mapping[str, StairsResults], reading: str) -> Table:
+    """Return the colony's best steps in a reading."""
+    result = results[reading]
+    values = {name: result.list_tracked(INDEX_NAMES.get(name, name)) for name in (*TRACKED, "zmp_margin_min_m")}
+    rows: list[Mapping[str, Value]] = [
+        {"": name, **{f"case {n}": value for n, value in zip(TABLE_4, row, strict=True)}}
+        for name, row in values.items()
+    ]
+    return tabulate(
+        make_title(reading), f"The colony's best steps: {reading}; where none is feasible, the least infeasible", rows
+    )
 
 
 PEAKS = ("acceleration", "jerk")
-
-
-def _compare(quantity: str, reading: str, values: Sequence[float]) -> dict[str, Value]:
-    paper = {f"paper, case {number}": getattr(case, quantity) for number, case in TABLE_4.items()}
-    here = {f"here, case {number}": value for number, value in zip(TABLE_4, values, strict=True)}
-    return {"quantity": quantity, **paper, "reading": reading, **here}
+TRACKED = ("torso_pitch_rad", "kp", "kd", "cost", "energy", "peak_torque_Nm")
+INDEX_NAMES = {"cost": "controller_cost", "energy": "energy_J"}
 
 
 def tabulate_climbs(results: Mapping[str, StairsResults]) -> Table:
@@ -226,59 +280,30 @@ def tabulate_climbs(results: Mapping[str, StairsResults]) -> Table:
     for reading in PLANS:
         for case, climb in zip(TABLE_4, results[reading].list_computed("climb"), strict=True):
             numbers = {"slip of the stance foot [m]": climb.get("slip_m"), "energy [J]": climb.get("energy_J")}
-            rows.append({"plan": reading, "case": case, **numbers, "result": describe_climb(climb)})
+            rows.append({"plan": reading, "case": case, **numbers, "result": describe_climb(TABLE_4[case], climb)})
     caption = "The plans in MuJoCo, their angles followed by drives; feet and shanks are solid"
     return tabulate("climbs", caption, rows)
-
-
-def tabulate_network(results: Mapping[str, StairsResults]) -> Table:
-    """Return how the network learns at three rates."""
-    rows = list[Mapping[str, Value]]()
-    for reading, plan in PLANS.items():
-        for label, row in zip(NETWORK_RATES, results[reading].computed[f"network-{plan}"], strict=True):
-            rows.append({"plan of case 1": reading, "rate": label, **dict(zip(NETWORK, row.values(), strict=True))})
-    caption = "Inverse kinematics by the network: poses within 1e-6 m² (cm²) after at most 5000 steps"
-    return tabulate("network", caption, rows)
-
-
-NETWORK = (
-    *("converged [%]", "after the first pose [%]", "steps of the first pose", "median steps of later poses"),
-    "largest error [rad]",
-)
-
-
-def draw(results: Mapping[str, StairsResults]) -> Figure:
-    """Return both legs in the plan of least jerk of case 2, on the stairs."""
-    signals, legs = results["least jerk"].motions[DRAWN_CASE]
-    tread, rise = TABLE_4[DRAWN_CASE].step_m
-    figure = make_figure(height_in=3.2)
-    edges = np.array([-1.6 * tread, *np.repeat([-SETBACK, tread - SETBACK], 2), 1.8 * tread])
-    heights = np.repeat([-rise, 0.0, rise], 2)
-    poses = np.linspace(0, len(signals.arrays["t"]) - 1, 25).astype(int)
-    for axes, side, name in zip(figure.subplots(1, 2, sharey=True), (RIGHT, LEFT), ("swing", "stance"), strict=True):
-        axes.fill_between(edges, heights, -1.3 * rise, color="0.9", linewidth=0)
-        for k, pose in enumerate(poses):
-            axes.plot(*legs[side][pose].T, color=(0.0, 0.45, 0.7, 0.25 + 0.75 * k / len(poses)), linewidth=0.8)
-        axes.set(aspect="equal", xlabel="x [m]", title=f"{name} leg")
-    figure.axes[0].set_ylabel("z [m]")
-    caption = f"The plan of least jerk, case {DRAWN_CASE} (Figs. 8, 9): its shanks pass through the next step"
-    return Figure(name="legs", caption=caption, drawing=figure)
 
 
 REPRODUCTION: Paper[StairsEffort, StairsResults] = Paper(
     book=BOOK,
     title="Climbing stairs with a toe-foot biped: Bhardwaj, Mishra, Sukavanam, Balasubramanian",
+    citation=(
+        "G. Bhardwaj, U. A. Mishra, N. Sukavanam, R. Balasubramanian: *Cycloidal trajectory realization on staircase based on "
+        "neural network temporal quantized Lagrange dynamics (NNTQLD) with ant colony optimization for a 9-link bipedal robot*."
+    ),
     full=StairsEffort(),
-    quick=StairsEffort(runs=0, starts=1, poses=50, track_s=0.3, track_cases=(DRAWN_CASE,)),
+    quick=StairsEffort(runs=0, poses=50),
     readings={
         "least jerk": "IPOPT's plan of least peak jerk, as the paper's knot shifting, within our limits",
         "least energy": "IPOPT's plan of least energy",
     },
     run_readings={name: row["text"] for name, row in TRACKINGS.items()},
+    choices={name: row["choice"] for name, row in TRACKINGS.items() if row["choice"]},
     compute=compute,
     headlines=(
-        *("best-cost", "best-energy", "best-torque", "least-gains", "track-energy"),
-        *("jerk-t1", "jerk-t2", "climb-landing", "network", "printed-gains"),
+        *("best-cost", "best-energy", "best-torque", "least-gains", "zmp"),
+        *("torso-energy", "peak-jerk", "climb-landing", "network", "warm-network"),
     ),
     show=show,
 )

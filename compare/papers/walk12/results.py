@@ -21,7 +21,7 @@ from compare.papers.paper_runs import (
 )
 from compare.study.record import RunRecord
 from compare.study.run import IPOPT, ProblemSpec, Run
-from metaheuristics import GeneticAlgorithm
+from metaheuristics.algorithms.genetic import GoswamiGeneticAlgorithm
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps
@@ -30,7 +30,7 @@ FOLDER = Path(__file__).parent
 READINGS = {row["name"]: row for row in read_rows(FOLDER / "readings.csv")}
 OPTIONS = {name: parse_settings(row["option"])[0] for name, row in READINGS.items()}
 LITERAL, RAISED, SECOND = "as printed", "ankle raised", "one second"
-GA, GA_EVALUATIONS = GeneticAlgorithm.goswami2008(), 930  # Table II: 30 epochs after the first population
+GA, GA_EVALUATIONS = GoswamiGeneticAlgorithm(), 930  # Table II: 30 epochs after the first population
 F1MAX, F2MAX = 442.522, 0.13  # [1/(m^2 s)], [m]
 UNBENT_WEIGHTS = (0.15, 0.9, 1.0)
 
@@ -71,7 +71,7 @@ class Walk12Effort(Effort):
     """Effort of the reproduction."""
 
     runs: int = 10  # of the GA on each problem
-    starts: int = 20  # of IPOPT on each problem
+    starts: int = 10  # of IPOPT on each problem
     lengths_m: tuple[float, ...] = tuple(np.linspace(0.05, 0.13, 9).round(6).tolist())  # of the front
 
 
@@ -157,25 +157,26 @@ def _make_tasks(effort: Walk12Effort) -> Iterator[Run]:
     for reading in READINGS:
         if reading != SECOND:
             for row in TABLE_3:
-                yield from _make_runs(effort, _make_spec(reading, f"{row.weight:g}", row.weight), ga=True)
+                yield from _make_runs(effort, make_spec(reading, f"{row.weight:g}", row.weight), ga=True)
             for s in effort.lengths_m:
                 bounds = {"step_length_m.lower": s, "step_length_m.upper": s}
-                yield from _make_runs(effort, _make_spec(reading, f"length-{s:g}", 1.0, **bounds))
+                yield from _make_runs(effort, make_spec(reading, f"length-{s:g}", 1.0, **bounds))
         for row in TABLE_4:
-            spec = _make_spec(reading, f"stable-{row.step_time_s:g}s", 1.0, step_time_s=row.step_time_s)
+            spec = make_spec(reading, f"stable-{row.step_time_s:g}s", 1.0, step_time_s=row.step_time_s)
             yield from _make_runs(effort, spec, ga=True)
     for weight in UNBENT_WEIGHTS:
-        yield from _make_runs(effort, _make_spec(LITERAL, f"unbent-{weight:g}", weight, reach_margin_rad=0.0))
+        yield from _make_runs(effort, make_spec(LITERAL, f"unbent-{weight:g}", weight, reach_margin_rad=0.0))
 
 
 def _make_optimum_tasks(effort: Walk12Effort, results: Mapping[str, Results]) -> Iterator[Run]:
     for reading, result in results.items():
         for row, f1max in zip(TABLE_4, result.f1max_over_time, strict=True):
             values = {"f1max": f1max, "step_time_s": row.step_time_s}
-            yield from _make_runs(effort, _make_spec(reading, f"optimum-{row.step_time_s:g}s", row.weight, **values))
+            yield from _make_runs(effort, make_spec(reading, f"optimum-{row.step_time_s:g}s", row.weight, **values))
 
 
-def _make_spec(reading: str, what: str, weight: float, **values: float) -> ProblemSpec:
+def make_spec(reading: str, what: str, weight: float, **values: float) -> ProblemSpec:
+    """Return a problem in a reading."""
     values = {"lambda": weight, "f1max": F1MAX, **values}
     return ProblemSpec(name="walk12", options=OPTIONS[reading], values=values, label=make_title(reading, what))
 

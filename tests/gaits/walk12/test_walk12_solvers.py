@@ -45,7 +45,7 @@ def test_the_papers_ga_on_the_compiled_objective() -> None:
         pytest.skip("no compiler")
     for seed in range(5):
         result = metaheuristics.minimize(
-            objective, metaheuristics.GeneticAlgorithm.goswami2008(), evaluations=930, seed=seed
+            objective, metaheuristics.make_algorithm("ga-goswami"), evaluations=930, seed=seed
         )
         assert result.feasible
         assert 0.9 < -result.objective < 0.9708 + OPTIMUM_TOLERANCE
