@@ -314,9 +314,8 @@ def _complete(
     if not all(set(EXTENTS) <= set(feet.get(side, ())) for side in SIDES):
         forward = description.file.forward
         feet = infer_feet(name, legs, links, joints, feet, model.read_shapes, forward, notes)
-    if listed := [
-        note for note in notes if not note.startswith(("left foot:", "right foot:", "no limit of speed: all"))
-    ]:
+    usual = ("left foot:", "right foot:", "no limit of speed: all")  # MJCF has no limits of speed
+    if listed := [note for note in notes if not note.startswith(usual)]:
         others = f" (and {len(listed) - 1} more)" if len(listed) > 1 else ""
         warn_once("robot %r: %s%s; see nlp-gait list --robot FILE", name, listed[0], others)
     return feet
@@ -325,12 +324,8 @@ def _complete(
 def _note_limits(joints: Joints, legs: Legs, notes: list[str]) -> None:
     """Note which joints of the legs have no limit, or a tighter one of software."""
     moving = [joint for joint in joints.values() if joint.child in legs.links]
-    for quantity, limits in (
-        ("torque", [joint.torque_limit_Nm for joint in moving]),
-        ("speed", [joint.velocity_limit_rad_s for joint in moving]),
-    ):
-        free = [joint.name for joint, limit in zip(moving, limits, strict=True) if limit == math.inf]
-        if free:
+    for quantity, limit in (("torque", "torque_limit_Nm"), ("speed", "velocity_limit_rad_s")):
+        if free := [joint.name for joint in moving if getattr(joint, limit) == math.inf]:
             listed = "all joints of the legs" if len(free) == len(moving) else ", ".join(free)
             notes.append(f"no limit of {quantity}: {listed}")
     if soft := [joint.name for joint in moving if joint.planning_limits_rad != joint.limits_rad]:
