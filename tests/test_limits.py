@@ -210,7 +210,7 @@ def test_unknown_limits_are_refused(limits: str, message: str) -> None:
 def test_a_limit_that_reads_what_a_motion_lacks_is_refused() -> None:
     class Unknown(Limit):
         def add(self, at: Point, samples: Samples, ops: Any) -> Any:
-            return [], {"index": ca.mmax(samples.temperature)}
+            return [], {"index": ca.mmax(samples.temperature)}  # type: ignore[attr-defined]
 
     problem = nlp_gait.load("nao-ssp").with_limits(single_support=[Unknown()])
     with pytest.raises(GaitError, match="temperature"):
