@@ -13,7 +13,6 @@ from functools import partial
 import numpy as np
 
 from compare.analysis.record_statistics import approximate_rank_sum
-from compare.papers.nao.dh import measure_stretched_height, measure_tables
 from compare.papers.nao.results import (
     COMPARED,
     HIPS_M,
@@ -39,6 +38,8 @@ from compare.papers.paper import Paper, parse_settings, read_book
 from compare.papers.paper_runs import evaluate_point
 from compare.papers.rules import Found
 from nlp_gait.formulation.signals import Signals
+from nlp_gait.gaits.nao.joints import measure_leg
+from nlp_gait.robots import load_robot
 
 BOOK = read_book(__file__)
 TEST_RUNS = 11  # of each search in the paper's tests
@@ -227,6 +228,13 @@ def count_gaps(result: NaoResults) -> int | None:
     return len(SWEEPS["gap", "dsp"][1]) - len(result.sweep("gap", "dsp")) if result.reading == RECONSTRUCTED else None
 
 
+def compute_highest_hip() -> float:
+    """Return the height of the torso above the sole of a stretched leg [m]."""
+    robot = load_robot("nao-v5")
+    leg = measure_leg(robot, "L")
+    return robot.feet["left"].ankle_height_m + leg.tibia_m + leg.thigh_m - leg.hip_m[2]
+
+
 def compute_speed_gain(result: NaoResults) -> float:
     """Return the mean speed of the hip at the shortest feasible duration of the sweeps, double by single support."""
     speeds = []
@@ -295,7 +303,7 @@ BOOK.bind(
         "lateral-range": list_wider,
         "velocities-dsp": lambda r: list(r.best(make_spec("dsp", r.reading)).x.values())[3:5],
         "gap-dsp": count_gaps,
-        "highest-hip": lambda r: measure_stretched_height(),
+        "highest-hip": lambda r: compute_highest_hip(),
         "faster-dsp": compute_speed_gain,
         "swing-hip": list_swing_shares,
         "swing-joints": list_swing_joints,
@@ -337,27 +345,9 @@ def measure_option(results: Mapping[str, NaoResults], id: str) -> dict[str, floa
     return effects
 
 
-def measure_swarm(results: Mapping[str, NaoResults]) -> dict[str, str]:
-    """Return how runs of the synchronous and of the asynchronous swarm end."""
-    effects = {}
-    for phase, words in PHASES.items():
-        ends = {
-            "all together": results["damped"].final_powers(phase, "PSO"),
-            "at once": results["damped"].computed[f"asynchronous-{phase}"],
-        }
-        for name, powers in ends.items():
-            low, middle, high = np.quantile(powers, (0.05, 0.5, 0.95))
-            effects[f"power in {words}, {name}"] = (
-                f"{middle:.4f} W ({low:.4f} to {high:.4f} in 90 % of {len(powers)} runs)"
-            )
-    return effects
-
-
 BOOK.bind({id: partial(measure_choice, id=id) for id in ("zmp", "samples", "masses")})
 OPTIONAL = ("lever", "arms-shared", "finite", "robot", "separate", "held")
 BOOK.bind({id: partial(measure_option, id=id) for id in OPTIONAL})
-BOOK.bind({"dh": lambda results: measure_tables()})
-BOOK.bind({"swarm": measure_swarm}, runs=True)
 
 
 REPRODUCTION: Paper[NaoEffort, NaoResults] = Paper(

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from compare.papers.nao import swarm
 from compare.papers.paper import read_rows
 from compare.papers.paper_runs import (
     Effort,
@@ -209,6 +208,3 @@ def _make_computations(effort: NaoEffort) -> Iterator[tuple[str, Computation]]:
             function = partial(collect_cloud, spec)
             arguments = {"algorithm": algorithm, "evaluations": effort.evaluations}
             yield make_computation(f"cloud-{phase}-{search}", spec, function, **arguments)
-        if effort.runs:
-            settings = {"runs": effort.variant_runs, "evaluations": effort.evaluations}
-            yield make_computation(f"asynchronous-{phase}", spec, partial(swarm.run_asynchronous, spec), **settings)
