@@ -25,7 +25,7 @@ from compare.bench.baseline import (
     TABLE,
     BaselineRun,
     get_reference,
-    list_drawn,
+    list_baselines,
     load_table,
     make_bench_study,
 )
@@ -51,7 +51,7 @@ def main() -> None:
     parser.add_argument("--instance", action="append", help="only this one; repeatable")
     parser.add_argument("--jobs", type=int, default=1)
     arguments = parser.parse_args()
-    ids = arguments.instance or (*gaitbench.list_instances(), *list_drawn())
+    ids = arguments.instance or (*gaitbench.list_instances(), *list_baselines(drawn=True))
     table = {id: list(rows) for id, rows in load_table().items()}
     for id in ids:
         started = time.perf_counter()

@@ -47,9 +47,7 @@ class Effect:
     @property
     def result(self) -> str:
         """Invariant, better or worse."""
-        if self.p >= SIGNIFICANT:
-            return "invariant"
-        return "better" if self.a12 > 0.5 else "worse"
+        return "invariant" if self.p >= SIGNIFICANT else "better" if self.a12 > 0.5 else "worse"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,21 +66,18 @@ class Audit:
         """Biases that were found, in words; empty for none."""
         from scipy.stats import binomtest
 
-        biases = []
         centre = next(effect for effect in self.effects if effect.change == CENTRE)
-        if centre.result == "better" and centre.a12 >= LARGE:
-            biases.append(
-                f"gains where the optimum is in the middle of the box (A12 {centre.a12:.2f}, p {centre.p:.1g})"
-            )
-        if self.edge > CLIPPED:
-            biases.append(f"clips: on noise, {100 * self.edge:.1f} % of the variables end exactly at a bound")
+        gain = f"gains where the optimum is in the middle of the box (A12 {centre.a12:.2f}, p {centre.p:.1g})"
+        clip = f"clips: on noise, {100 * self.edge:.1f} % of the variables end exactly at a bound"
+        lean = f"on noise, {100 * self.middle:.1f} % of the variables end in the middle 10 % of their ranges"
         values = self.runs * NOISE_VARIABLES
         test = binomtest(round(self.middle * values), values, MIDDLE, "greater")
-        if self.middle > EXCESS * MIDDLE and test.pvalue < SIGNIFICANT:
-            biases.append(
-                f"on noise, {100 * self.middle:.1f} % of the variables end in the middle 10 % of their ranges"
-            )
-        return tuple(biases)
+        biases = {
+            gain: centre.result == "better" and centre.a12 >= LARGE,
+            clip: self.edge > CLIPPED,
+            lean: self.middle > EXCESS * MIDDLE and test.pvalue < SIGNIFICANT,
+        }
+        return tuple(words for words, is_biased in biases.items() if is_biased)
 
 
 class MovedProblem:

@@ -44,23 +44,18 @@ def choose_instances(
     if families is not None:
         drawn = parse_seeds(seeds)
         chosen += tuple(make_id(family.strip(), seed) for family in families.split(",") for seed in drawn)
-    chosen = chosen or (list_drawn() if suite == "drawn" else gaitbench.list_instances(suite))
+    chosen = chosen or (list_baselines(drawn=True) if suite == "drawn" else gaitbench.list_instances(suite))
     for id in chosen:
         gaitbench.load(id)  # raises for unknown ids
     return chosen
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
-    """Return the seeds of ``0:15`` (15 is not among them) or ``3,5,8``; raises InputError."""
+    """Return the seeds of ``0:15``, of which 15 is not one; raises InputError."""
     match = SEEDS.fullmatch(text)
-    words = text.split(",")
-    seeds: Sequence[int] = range(int(match[1]), int(match[2])) if match else ()
-    if not match and len(words) <= MOST_SEEDS and all(word.strip().isdecimal() for word in words):
-        seeds = tuple(map(int, words))
+    seeds = range(int(match[1]), int(match[2])) if match else range(0)
     if not 0 < len(seeds) <= MOST_SEEDS:
-        raise InputError(
-            f"--seeds takes FIRST:END or numbers with commas, at most {MOST_SEEDS}, got {format_value(text)}"
-        )
+        raise InputError(f"--seeds takes FIRST:END, at most {MOST_SEEDS} seeds, got {format_value(text)}")
     return tuple(seeds)
 
 
@@ -96,14 +91,9 @@ def load_table(path: Path = TABLE) -> Mapping[str, tuple[BaselineRun, ...]]:
     return {instance: tuple(group) for instance, group in rows.items()}
 
 
-def list_baselines() -> tuple[str, ...]:
-    """Return the ids of the instances with a baseline, without drawn ones."""
-    return tuple(id for id in load_table() if not is_generated(id))
-
-
-def list_drawn() -> tuple[str, ...]:
-    """Return the ids of the drawn instances with a baseline."""
-    return tuple(id for id in load_table() if is_generated(id))
+def list_baselines(*, drawn: bool = False) -> tuple[str, ...]:
+    """Return the ids of the instances with a baseline: drawn ones, or all others."""
+    return tuple(id for id in load_table() if is_generated(id) is drawn)
 
 
 @cache

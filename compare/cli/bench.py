@@ -8,11 +8,11 @@ from typer import Option
 
 from compare.bench.audit import INSTANCES, audit_search
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, load_table, make_bench_study
-from compare.bench.leaderboard import describe_place, make_leaderboard_page, rank_solvers
-from compare.cli.command import OUTPUT, command
+from compare.bench.leaderboard import make_leaderboard_page, rank_solvers
+from compare.cli.command import CONTINUE, OUTPUT, command
 from compare.cli.compare import run_in_folder
 from compare.cli.options import Evaluations, Jobs, Scheduler, parse_names
-from compare.cli.printing import Output, Rows, describe_command, show_progress, tabulate
+from compare.cli.printing import Output, Rows, describe_command, show_progress
 from compare.report.document import Document, make_text_table
 from compare.report.writing import add_origin, write_document
 from compare.study.run import check_run
@@ -83,19 +83,16 @@ def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEff
         name = settings.make_runs()[-1].title if algorithm is not None else None
         if name in BASELINE:
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
-        remedy = "rerun the command to continue"
-        records = run_in_folder(settings, out, effort.jobs, effort.scheduler, remedy)
+        records = run_in_folder(settings, out, effort.jobs, effort.scheduler, CONTINUE)
     board = rank_solvers(instances, records, shipped=shipped)
     page = make_leaderboard_page(board, name, chosen.title, effort.evaluations)
     problems = [{"name": "gaitbench", "options": {"instance": id}} for id in instances]
-    columns = {
-        "rank": lambda item: str(item[0]),
-        "solver": lambda item: item[1].solver,
-        "mean rank": lambda item: f"{item[1].mean_rank:.2f}",
-        "targets solved": lambda item: f"{100 * item[1].solved:.1f} %",
-        "runs feasible": lambda item: f"{100 * item[1].feasible:.0f} %",
-    }
-    title = f"GaitBench, {chosen.title}: {len(instances)} instances"
+    rows = [
+        (str(k), one.solver, f"{one.mean_rank:.2f}", f"{100 * one.solved:.1f} %", f"{100 * one.feasible:.0f} %")
+        for k, one in enumerate(board.standings, start=1)
+    ]
+    header = ("rank", "solver", "mean rank", "targets solved", "runs feasible")
+    table = Rows(f"GaitBench, {chosen.title}: {len(instances)} instances", header, rows)
     return Output(
         data={
             "suite": chosen.title,
@@ -104,10 +101,7 @@ def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEff
             "rank": None if name is None else board.place(name),
             "standings": [asdict(standing) for standing in board.standings],
         },
-        parts=[
-            tabulate(title, enumerate(board.standings, start=1), columns),
-            *(() if name is None else describe_place(board, name)),
-        ],
+        parts=[table, *page.headline],
         written=write_document(out, add_origin(page, describe_command(), problems), "leaderboard"),
     )
 

@@ -118,8 +118,9 @@ def compare(
     records += read_imported_records(out, records)
     written = write_report(out, records, read_study_file(out))
     comparisons = compare_problems(records, folder=out)
-    for sentence in (sentence for comparison in comparisons for sentence in describe_failures(comparison)):
-        say_error(sentence)
+    for comparison in comparisons:
+        for sentence in describe_failures(comparison):
+            say_error(sentence)
     lost = ", ".join(s.name for c in comparisons for s in c.solvers if not any(r.x for r in s.records))
     remedy = f"without any result: {lost}; fix the cause, and delete the failed records to run them again"
     return Output(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,7 +13,7 @@ from typer import Option
 from compare.analysis.units import make_heading, with_unit
 from compare.cli.command import OUTPUT_FILE, command
 from compare.cli.options import AnyProblem, parse_number, parse_numbers, parse_options, parse_pairs
-from compare.cli.printing import Output, Rows, fail, tabulate
+from compare.cli.printing import Output, Rows, fail
 from compare.judge import Evaluation
 from compare.judge import evaluate as judge
 from compare.rounding import evaluate_rounded
@@ -143,20 +143,16 @@ def _describe_gait(judged: JudgedGait) -> Iterator[str | Rows]:
 
 def _tabulate(judged: Sequence[Evaluation]) -> Rows:
     objective, over_time = judged[0].objective, any(evaluation.dense is not None for evaluation in judged)
-    columns: dict[str, Callable[[tuple[int, Evaluation]], str]] = {
-        "row": lambda item: str(item[0]),
-        make_heading(objective["name"], objective["unit"]): lambda item: f"{item[1].objective['value']:.6g}",
-        "violation": lambda item: f"{item[1].violation:.3g}",
-        "feasible": lambda item: "yes" if item[1].feasible else "no",
-        "between samples": lambda item: "-" if item[1].dense is None else "no" if item[1].dense_violations else "yes",
-        "guaranteed": lambda item: "-" if item[1].guaranteed is None else item[1].guaranteed.word,
-        "largest violation": lambda item: next(
-            (row.name for row in (*item[1].violations, *item[1].dense_violations)), "-"
-        ),
-    }
-    if not over_time:
-        del columns["between samples"], columns["guaranteed"]
-    return tabulate(f"{judged[0].problem}: {len(judged)} candidates", enumerate(judged, start=1), columns)
+    header = ("row", make_heading(objective["name"], objective["unit"]), "violation", "feasible")
+    rows = []
+    for row, e in enumerate(judged, start=1):
+        between = "-" if e.dense is None else "no" if e.dense_violations else "yes"
+        dense = (between, "-" if e.guaranteed is None else e.guaranteed.word) if over_time else ()
+        worst = next((violated.name for violated in (*e.violations, *e.dense_violations)), "-")
+        feasible = "yes" if e.feasible else "no"
+        rows.append((str(row), f"{e.objective['value']:.6g}", f"{e.violation:.3g}", feasible, *dense, worst))
+    over = ("between samples", "guaranteed") if over_time else ()
+    return Rows(f"{judged[0].problem}: {len(judged)} candidates", (*header, *over, "largest violation"), rows)
 
 
 def _list_cells(judged: Sequence[Evaluation]) -> Iterator[Sequence[object]]:
@@ -174,17 +170,17 @@ def _list_cells(judged: Sequence[Evaluation]) -> Iterator[Sequence[object]]:
 def _describe(evaluation: Evaluation) -> Iterator[str | Rows]:
     objective, dense, guaranteed = evaluation.objective, evaluation.dense, evaluation.guaranteed
     yield f"{evaluation.problem}: {objective['name']} {with_unit(objective['value'], objective['unit'])}"
-    means = {} if guaranteed is None else guaranteed.means
-    columns: dict[str, Callable[[tuple[str, float]], str]] = {"index": lambda index: index[0]}
-    columns["value" if dense is None else "samples"] = lambda index: f"{index[1]:z.6f}"
+    header = ["index", "value" if dense is None else "samples"]
+    rows = [[name, f"{value:z.6f}"] for name, value in evaluation.indexes.items()]
     if dense is not None:
-        columns[f"{evaluation.dense_intervals} intervals"] = lambda index: with_unit(dense.get(index[0]), "1")
-    if means:
-        columns["proven over time"] = lambda index: (
-            "{:.6f} to {:.6f}".format(*means[index[0]]) if index[0] in means else "-"
-        )
-    if evaluation.indexes:
-        yield tabulate("Indexes", evaluation.indexes.items(), columns)
+        header.append(f"{evaluation.dense_intervals} intervals")
+        rows = [[*row, with_unit(dense.get(row[0]), "1")] for row in rows]
+    if guaranteed is not None and guaranteed.means:
+        header.append("proven over time")
+        ends = {name: "{:.6f} to {:.6f}".format(*mean) for name, mean in guaranteed.means.items()}
+        rows = [[*row, ends.get(row[0], "-")] for row in rows]
+    if rows:
+        yield Rows("Indexes", header, rows)
     yield from _describe_violations(evaluation)
     if guaranteed is not None and dense is not None:
         yield f"Guaranteed: {guaranteed}"
@@ -193,16 +189,13 @@ def _describe(evaluation: Evaluation) -> Iterator[str | Rows]:
 def _describe_violations(evaluation: Evaluation) -> Iterator[str | Rows]:
     for title, violated in (("samples", evaluation.violations), ("dense grid", evaluation.dense_violations)):
         place = "" if evaluation.dense is None else f" on the {title}"
-        columns = {
-            "constraint": lambda v: v.name,
-            "value": lambda v: f"{v.value:.6g}",
-            "lower": lambda v: with_unit(v.lower, "1", ".6g"),
-            "upper": lambda v: with_unit(v.upper, "1", ".6g"),
-            "violation": lambda v: with_unit(v.violation, v.unit, ".3g"),
-        }
-        if violated:
-            heading = f"Infeasible{place}: {len(violated)} violated, worst first"
-            yield tabulate(heading, violated[:SHOWN_VIOLATIONS], columns)
+        rows = []
+        for v in violated[:SHOWN_VIOLATIONS]:
+            lower, upper = (with_unit(end, "1", ".6g") for end in (v.lower, v.upper))
+            rows.append((v.name, f"{v.value:.6g}", lower, upper, with_unit(v.violation, v.unit, ".3g")))
+        if rows:
+            header = ("constraint", "value", "lower", "upper", "violation")
+            yield Rows(f"Infeasible{place}: {len(violated)} violated, worst first", header, rows)
         elif title == "samples" or evaluation.dense is not None:
             yield f"feasible{place}"
     if any(row.lower == row.upper and row.violation <= USUAL_TOLERANCE for row in evaluation.violations):

@@ -20,6 +20,7 @@ from nlp_gait.user_code import find_entry_points
 if TYPE_CHECKING:
     from compare.study.description import Description
 
+OWN = "your own problem or algorithm can be used by name: FILE.py:NAME or MODULE:NAME; a program: cmd:COMMAND"
 ALGORITHMS = "algorithms"  # the name that stands for all of them
 OVERRIDE = (
     "override any of this in a JSON file next to the model, see docs/robots.md; gaits: solve humanoid-ssp, humanoid-dsp "
@@ -85,11 +86,11 @@ def _describe_robot(name: str, target: Path | None) -> Output:
     finally:
         log.removeFilter(_belongs_here)
     facts, notes, title = describe_humanoid(body), body.biped.full.notes, body.biped.full.name
-    written: tuple[Path, ...] = ()
+    written = []
     if target is not None:
         from compare.drawing.robot_figures import plot_robot
 
-        written = (plot_robot(body.biped, target.with_suffix(".png")),)
+        written.append(plot_robot(body.biped, target.with_suffix(".png")))
     table, joints = Rows(f"Robot {title} as read", ("item", "value"), facts), list_joints(body)
     both = (
         "Joints of the left leg: range, limits, rotor, damping; left / right where they differ: the tighter is planned"
@@ -118,16 +119,12 @@ def _list_all() -> Output:
         f"for several objectives (pareto): {', '.join(listed['fronts'])}",
         f"robots: {', '.join(listed['robots'])}",
     ]
-    for kind, packages_by_name in installed.items():
-        if packages_by_name:
-            packages = ", ".join(f"{name} ({value})" for name, value in packages_by_name.items())
-            parts.append(f"{kind} of other installed packages: {packages}")
-    parts.append(
-        "your own problem or algorithm can be used by name: FILE.py:NAME or MODULE:NAME; a program: cmd:COMMAND"
-    )
-    described = {
-        name: {"title": title, "variables": n, "parameters": p} for name, (title, n, p) in listed["problems"].items()
-    }
+    for kind, packages in installed.items():
+        names = ", ".join(f"{name} ({value})" for name, value in packages.items())
+        parts += [f"{kind} of other installed packages: {names}"] if names else []
+    parts.append(OWN)
+    keys = ("title", "variables", "parameters")
+    described = {name: dict(zip(keys, row, strict=True)) for name, row in listed["problems"].items()}
     return Output(data={**listed, "problems": described, "installed": installed}, parts=parts)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn, TypeVar
+from typing import Any, NamedTuple, NoReturn
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -19,8 +19,6 @@ from rich.table import Table
 from rich.text import Text
 
 from nlp_gait.files import replace_nan
-
-T = TypeVar("T")
 
 MOST_NAMED = 3  # written files; of more, the first one is named
 LONGEST_CELL = 24  # characters of a word in a table that are not wrapped
@@ -148,11 +146,6 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
             stdout.print(f"  {name}: {text}", soft_wrap=False)
 
 
-def tabulate(title: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> Rows:
-    """Return a table with a row per item; columns map headings to functions of the item."""
-    return Rows(title, list(columns), [[cell(item) for cell in columns.values()] for item in items])
-
-
 class ProgressLine:
     """A line on a terminal that is rewritten, from the first second on; in a log, a line every half minute."""
 
@@ -177,7 +170,7 @@ class ProgressLine:
     def describe(self) -> str:
         """Return for example ``runs 48 of 106, 31 s left, best gap 0.0046 % (nao-ssp, ACO)``."""
         seconds, of = time.monotonic() - self.started, "" if self.total is None else f" of {self.total:,}"
-        left = f"{format_duration(seconds)}"
+        left = format_duration(seconds)
         if self.total is not None and self.fresh:
             left = f"{format_duration(seconds / self.fresh * max(self.total - self.done, 0))} left"
         return escape_controls(", ".join(filter(None, (f"{self.description} {self.done:,}{of}", left, self.note))))

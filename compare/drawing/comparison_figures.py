@@ -1,7 +1,4 @@
-"""Figures of a comparison: gaps over costs, shares of solved targets, final gaps of runs.
-
-A figure is a function from a comparison to charts; ``compare.drawing.charts`` draws them.
-"""
+"""Charts of a comparison: gaps over costs, shares of solved targets, final gaps of runs."""
 
 from __future__ import annotations
 
@@ -48,13 +45,11 @@ def make_convergence_charts(comparison: Comparison) -> list[Chart]:
 
     A line begins where half of the runs are feasible, a band where all are. A run of a gradient method is a point at its end.
     """
-    series = {
-        axis: [s for solver in comparison.solvers if solver.has_costs(axis) for s in _trace_gaps(solver, axis)]
-        for axis in AXES
-    }
-    return [
-        Chart(x=words, y=GAP, series=series[axis], log=(True, True)) for axis, words in AXES.items() if series[axis]
-    ]
+    charts = []
+    for axis, words in AXES.items():
+        series = [s for solver in comparison.solvers if solver.has_costs(axis) for s in _trace_gaps(solver, axis)]
+        charts += [Chart(x=words, y=GAP, series=series, log=(True, True))] if series else []
+    return charts
 
 
 def _trace_gaps(solver: SolverRuns, axis: str) -> list[Series]:

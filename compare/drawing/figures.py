@@ -9,9 +9,8 @@ from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from compare.drawing import STYLE
 from nlp_gait.files import replace_file
@@ -41,8 +40,7 @@ LEGS = {"left": "#7A5CC0", "right": "#A07D1C", "trunk": INK}  # unlike those of 
 SUPERSCRIPTS = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Look:
+class Look(NamedTuple):
     """Colour and line of a solver."""
 
     colour: str
@@ -128,11 +126,8 @@ def inline_svg(svg: str, prefix: str, title: str) -> str:
 
     Ids begin with the prefix, letters and digits that are unique in the page; the title is the alternative text.
     """
-    svg = svg[svg.index("<svg") :]
-    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
-    svg = re.sub(r'\bid="', f'id="{prefix}-', svg)
-    svg = re.sub(r"url\(#", f"url(#{prefix}-", svg)
-    svg = re.sub(r'href="#', f'href="#{prefix}-', svg)
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
+    svg = re.sub(r'(\bid="|url\(#|href="#)', rf"\1{prefix}-", svg)
     svg = svg.replace("fill: #ffffff", "fill: none").replace(INK, "currentColor").replace("#d0d0d0", "var(--grid)")
     # Text without a fill is black by default, in a dark page too.
     return svg.replace("<svg ", f'<svg role="img" aria-label="{title}" fill="currentColor" ', 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -59,11 +59,7 @@ def plot_gait(problem: GaitProblem, x: Array | Mapping[str, float], name: str) -
 
 
 def draw_gaits(gaits: Mapping[str, GaitCurves], *, curves: bool = True) -> list[Drawing]:
-    """Draw the first gait from the side, and the curves of all.
-
-    Raises:
-        InputError: there is nothing to draw.
-    """
+    """Draw the first gait from the side, and the curves of all; raises InputError if there is nothing to draw."""
     charts = make_gait_charts(gaits) if curves else []
     first = next(iter(gaits.values()))
     if first.skeleton is None and not charts:
@@ -84,17 +80,6 @@ def make_gait_charts(gaits: Mapping[str, GaitCurves]) -> list[Chart]:
     return charts
 
 
-class View(NamedTuple):
-    """A view from the side."""
-
-    scale: float  #: [pixels/m]
-    corner: Array  #: (2,) place of the origin [pixels]
-
-    def place(self, points: Array) -> Array:
-        """Return the pixels (..., 2) of points (..., 3)."""
-        return self.corner + self.scale * points[..., [0, 2]] * (1.0, -1.0)
-
-
 def draw_poses(first: Skeleton) -> Drawing:
     """Draw poses of a gait from the side, later ones darker, and a legend below."""
     low, high = first.box()
@@ -103,14 +88,16 @@ def draw_poses(first: Skeleton) -> Drawing:
     scale = float(min((WIDTH, HEIGHT - LINE) / np.abs(ends[1] - ends[0])))
     corner = np.array([WIDTH, HEIGHT - LINE]) / 2.0 - scale * (ends[0] + ends[1]) / 2.0
 
-    view = View(scale, corner)
-    shapes: list[Stroke | Label] = [Stroke(lines=[view.place(np.insert(first.ground, 1, 0.0, axis=1))], colour=GROUND)]
+    def place(points: Array) -> Array:  # pixels (..., 2)
+        return corner + scale * points[..., [0, 2]] * (1.0, -1.0)
+
+    shapes: list[Stroke | Label] = [Stroke(lines=[place(np.insert(first.ground, 1, 0.0, axis=1))], colour=GROUND)]
     chosen = np.unique(np.linspace(0, len(first.t) - 1, POSES).round().astype(int)).tolist()
     for k, opacity in zip(chosen, np.linspace(FAINTEST, 1.0, len(chosen)).tolist(), strict=True):
         parts = [(limb.side, limb.points[k], 1.5) for limb in first.limbs]
         parts += [(sole.side, np.concatenate([sole.corners[k], sole.corners[k, :1]]), 2.4) for sole in first.soles]
         shapes += [
-            Stroke(lines=[view.place(points)], colour=LEGS[side], width=width, opacity=opacity)
+            Stroke(lines=[place(points)], colour=LEGS[side], width=width, opacity=opacity)
             for side, points, width in parts
         ]
     legend = [("left leg", LEGS[LEFT], ""), ("right leg", LEGS[RIGHT], "")]

@@ -12,7 +12,6 @@ from compare.bench.baseline import (
     RUNS,
     TABLE,
     list_baselines,
-    list_drawn,
     load_baseline,
 )
 from compare.bench.leaderboard import rank_solvers
@@ -92,7 +91,7 @@ def test_a_solver_that_finds_nothing_is_last() -> None:
 
 @pytest.mark.slow
 def test_drawn_instances_have_a_baseline() -> None:
-    drawn = list_drawn()
+    drawn = list_baselines(drawn=True)
     assert len(drawn) >= 54 and len({id.split(":")[1] for id in drawn}) >= 9
     chosen = [id for id in drawn if id.startswith(("gb2:walk12", "gb2:dsp-timed"))]
     board = rank_solvers(chosen)

@@ -67,7 +67,7 @@ REFUSED = {
     f"{BENCH} --algorithm psoo": "unknown algorithm 'psoo'",
     f"{BENCH} --algorithm pso --label pso": "is a solver of the baseline",
     "bench --instances ssp-v55 --out {new}": "unknown instance of GaitBench 'ssp-v55'",
-    "bench --families ssp --seeds 5:3 --out {new}": "--seeds takes FIRST:END or numbers",
+    "bench --families ssp --seeds 5:3 --out {new}": "--seeds takes FIRST:END",
     "export {gait} --to webot": "unknown kind 'webot'|webots",
     "export {gait} --to csv --set a=1": "leave out --set",
     "export {gait} --to csv --limit FrictionCone": "leave out --set and --limit",
