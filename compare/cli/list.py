@@ -129,9 +129,9 @@ def _list_all() -> Output:
 
 
 def _describe_problem(name: str, options: Mapping[str, Any]) -> Output:
-    from nlp_gait import formulation
+    import nlp_gait
 
-    problem = formulation.load(name, **options)
+    problem = nlp_gait.load(name, **options)
     where = "".join(f" with --{key} {value}" for key, value in options.items())
     limits = [(v.name, f"{v.lower:g}", f"{v.upper:g}", v.unit, v.description) for v in problem.variables]
     parameters = [(q.name, f"{q.default:g}", q.unit, q.description) for q in problem.own_parameters]
