@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from compare.judge import evaluate
-from compare.study.run import ProblemSpec, Run
+from compare.study.run import ProblemSpec, Run, make_inputs
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Grid, load
@@ -109,8 +109,8 @@ def test_recorded_options_make_the_same_problem(name: str) -> None:
     recorded = make_task(problem.name, problem.options)
     again = recorded.problem.load()
     assert (again.options, again.grid) == (problem.options, problem.grid)
-    assert recorded.inputs() == asked.inputs()
-    assert asked.inputs().key != make_task(name, {}).inputs().key
+    mine, same, default = make_inputs([asked, recorded, make_task(name, {})])
+    assert same == mine and mine.key != default.key
     assert build_exact_model(again).row_names == build_exact_model(problem).row_names
     x = problem.lower + 0.4 * (problem.upper - problem.lower)
     here, there = evaluated(problem, x), evaluated(again, x)

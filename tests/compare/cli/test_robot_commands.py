@@ -40,7 +40,7 @@ def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
 def test_a_drive_is_read_from_a_file(gait, tmp_path):
     pytest.importorskip("mujoco")
     drive = tmp_path / "drive.toml"
-    drive.write_text('period_s = 0.02\ninterpolation = "held"\n[feedback]\ndelay_s = 0.02\n')
+    drive.write_text('period_s = 0.02\ninterpolation = "held"\n')
     (held, default) = (
         json.loads(nlp_gait("simulate", gait, *more, "--json").stdout) for more in (("--drive", drive), ())
     )
@@ -70,8 +70,8 @@ def test_export_writes_next_to_the_result_by_default(gait):
 
 def test_export_writes_a_page(gait):
     gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.3}}))
-    for _ in range(2):  # its own file may be replaced
-        nlp_gait("export", gait, "--to", "html")
+    for force in ([], ["--force"]):
+        nlp_gait("export", gait, "--to", "html", *force)
     assert ">right leg</text>" in gait.with_suffix(".html").read_text()
 
 
