@@ -12,7 +12,6 @@ from typer import Argument, Option
 from compare.analysis.columns import PRINTED, format_rows, summarise
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import LiveGaps, describe_failures, describe_unknown, write_headlines
-from compare.analysis.units import with_unit
 from compare.cli import options
 from compare.cli.command import OUTPUT, SESSION, command, get_marks
 from compare.cli.printing import Output, Rows, describe_command, say, say_error, show_progress, stderr
@@ -29,7 +28,6 @@ from nlp_gait.files import make_writable_folder
 from nlp_gait.interrupts import Interrupted
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
-MOST_RUNS = 12  # of a problem whose runs are printed one by one
 ALL, ALL_GRADIENT = "all", (IPOPT, "slsqp")
 
 
@@ -125,7 +123,7 @@ def compare(
     remedy = f"without any result: {lost}; fix the cause, and delete the failed records to run them again"
     return Output(
         data={"problems": summarise_problems(comparisons), "runs": [_encode_run(record) for record in records]},
-        parts=[*_tabulate_runs(comparisons), *describe_summaries(comparisons)],
+        parts=list(describe_summaries(comparisons)),
         written=written,
         answer=write_headlines(comparisons),
         failures=[remedy] if lost else [],
@@ -179,20 +177,6 @@ def _encode_run(record: RunRecord) -> dict[str, Any]:
     plain = record.to_json()
     costs = {"evaluations": plain["counts"].get("f"), "time_s": plain["time_s"]["solve"]}
     return {**{key: plain[key] for key in ENCODED}, "seed": record.seed, **costs}
-
-
-def _tabulate_runs(comparisons: Sequence[Comparison]) -> Iterator[Rows]:
-    """Yield a table of the runs of each problem that has few of them, as judged by the exact functions."""
-    for comparison in comparisons:
-        if len(comparison.records) > MOST_RUNS:
-            continue
-        rows = []
-        for run in comparison.records:
-            objective = with_unit(run.objective, comparison.objective.unit)
-            violation = f"{run.violation:.3g}"
-            rows.append((run.solver, str(run.run), str(run.seed), objective, violation, run.status))
-        header = ("solver", "run", "seed", comparison.objective.name, "violation", "status")
-        yield Rows(f"{comparison.problem}: runs", header, rows)
 
 
 def describe_summaries(comparisons: Sequence[Comparison]) -> Iterator[str | Rows]:
