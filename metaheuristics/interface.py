@@ -230,9 +230,7 @@ class Result:
     objective_time_s: float  #: part of it spent in the objective [s]
     algorithm: Algorithm  #: settings used
     handling: ConstraintHandling  #: constraint handling used
-    #: With the spawn key all to repeat the run: `numpy.random.SeedSequence(seed_entropy, spawn_key=seed_spawn_key)`
-    seed_entropy: int | tuple[int, ...]
-    seed_spawn_key: tuple[int, ...]  #: see `seed_entropy`
+    seed: int  #: of starting points and search
 
     @property
     def feasible(self) -> bool:

@@ -200,7 +200,7 @@ class _Run:
     evaluations: int
     handling: ConstraintHandling
     stop: EarlyStop
-    sequence: np.random.SeedSequence
+    seed: int
     point: Callable[[Array], tuple[float, float]] | None = None  # see ``Evaluate``
     reasons: list[str] = field(default_factory=list)
     initial_violation: Array | None = None
@@ -259,8 +259,7 @@ class _Run:
             objective_time_s=record.objective_time_s,
             algorithm=self.algorithm,
             handling=self.handling,
-            seed_entropy=preparation.encode_entropy(self.sequence),
-            seed_spawn_key=tuple(self.sequence.spawn_key),
+            seed=self.seed,
         )
 
 
@@ -269,7 +268,7 @@ def minimize(
     algorithm: Algorithm,
     *,
     evaluations: int = 10_000,
-    seed: int | np.random.SeedSequence = 0,
+    seed: int = 0,
     handling: ConstraintHandling | None = None,
     stop: EarlyStop | None = None,
     initial: ArrayLike | None = None,
@@ -285,7 +284,7 @@ def minimize(
         objective: What to minimise; it must not depend on the order of calls.
         algorithm: Settings of the search.
         evaluations: Budget. It is never exceeded: of the last generation only the first rows that fit are evaluated.
-        seed: A whole number >= 0, or a SeedSequence, which is not consumed.
+        seed: A whole number >= 0.
         handling: How constraints enter the comparisons within the search, by default by Deb's rules, by which the best
             point is reported in any case.
         stop: What ends the search earlier, such as ``EarlyStop(target=0.85, time_limit_s=60.0)``.
@@ -305,15 +304,12 @@ def minimize(
         raise SearchError(f"stop must be made by EarlyStop(...), or None, got {abbreviate(stop)}")
     preparation.check_budget(algorithm, evaluations)
     preparation.check_helpers(handling, callback)
-    sequence = preparation.seed_sequence(seed)
     limit_s = stop.time_limit_s
-    start = preparation.prepare_start(objective, algorithm.population, evaluations, sequence, initial, limit_s)
+    start = preparation.prepare_start(objective, algorithm.population, evaluations, seed, initial, limit_s)
     search = algorithm.start(start)
     # A search that calls the objective evaluates point by point.
     record = Evaluator(objective, callback, thinned=isinstance(search, CallingSearch))
-    run = _Run(
-        record=record, algorithm=algorithm, evaluations=evaluations, handling=handling, stop=stop, sequence=sequence
-    )
+    run = _Run(record=record, algorithm=algorithm, evaluations=evaluations, handling=handling, stop=stop, seed=seed)
     if callback is None and isinstance(handling, Deb) and callable(getattr(objective, "point", None)):
         run.point = run.evaluate_point
     try:

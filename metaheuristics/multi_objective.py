@@ -13,7 +13,7 @@ import numpy as np
 from metaheuristics.adapters.pymoo import FRONT_MODULES, MultiObjective
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Array, Bounded
-from metaheuristics.preparation import prepare_start, seed_sequence
+from metaheuristics.preparation import prepare_start
 from metaheuristics.registry import make_by_name
 
 
@@ -79,7 +79,7 @@ def minimize_many(
         SearchError: an argument is not allowed, all variables are fixed, or an objective is not finite.
     """
     check_budgets(algorithm, evaluations)
-    start = prepare_start(objectives, algorithm.population, evaluations[-1], seed_sequence(seed))
+    start = prepare_start(objectives, algorithm.population, evaluations[-1], seed)
     if not (start.upper > start.lower).any():
         raise SearchError("all variables are fixed, so there is no front; widen the bounds of one")
     search = algorithm.start(start, objectives.count)

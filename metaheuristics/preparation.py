@@ -17,16 +17,15 @@ def prepare_start(
     objective: Bounded,
     population: int,
     evaluations: int,
-    seed: np.random.SeedSequence,
+    seed: int,
     initial: ArrayLike | None = None,
     time_limit_s: float | None = None,
 ) -> Start:
-    """Return the inputs of an algorithm; raises SearchError for bounds or starting points (R, n) that are not allowed."""
+    """Return the inputs of an algorithm; raises SearchError for a seed, bounds or starting points (R, n) that are not allowed."""
+    if not is_number(seed, Integral) or seed < 0:
+        raise SearchError(f"seed must be a whole number >= 0, got {abbreviate(seed)}")
     lower, upper = read_bounds(objective)
-    # The children that a first `spawn` would give, without counting them in the parent.
-    keys = [(*seed.spawn_key, index) for index in (0, 1)]
-    size = seed.pool_size
-    first, second = (np.random.SeedSequence(seed.entropy, spawn_key=key, pool_size=size) for key in keys)
+    first, second = np.random.SeedSequence(int(seed)).spawn(2)
     return Start(
         lower=lower,
         upper=upper,
@@ -163,21 +162,6 @@ def check_points(given: object, lower: Array, upper: Array, source: str = "ask")
             f"{lower[column]}..{upper[column]}: clip the points"
         )
     return points
-
-
-def seed_sequence(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:
-    """Return a seed as a SeedSequence; SearchError unless it is one or a whole number >= 0."""
-    if isinstance(seed, np.random.SeedSequence):
-        return seed
-    if not is_number(seed, Integral) or seed < 0:
-        raise SearchError(f"seed must be a whole number >= 0 or a numpy SeedSequence, got {abbreviate(seed)}")
-    return np.random.SeedSequence(int(seed))
-
-
-def encode_entropy(sequence: np.random.SeedSequence) -> int | tuple[int, ...]:
-    """Return the entropy of a seed as plain data."""
-    parts: list[int] | int = np.asarray(sequence.entropy, dtype=object).tolist()
-    return tuple(map(int, parts)) if isinstance(parts, list) else int(parts)
 
 
 def draw_starting_points(

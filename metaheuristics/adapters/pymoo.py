@@ -21,10 +21,7 @@ MODULES: Mapping[str, str] = {
     "GA": "soo.nonconvex.ga",
     "ISRES": "soo.nonconvex.isres",
     "NRBO": "soo.nonconvex.nrbo",
-    "NSGA2": "moo.nsga2",
     "PSO": "soo.nonconvex.pso",
-    "SMSEMOA": "moo.sms",
-    "SPEA2": "moo.spea2",
     "SRES": "soo.nonconvex.sres",
 }
 FRONT_MODULES: Mapping[str, str] = {"NSGA2": "moo.nsga2", "CMOPSO": "moo.cmopso"}
@@ -70,7 +67,7 @@ class PymooSettings:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Pymoo(PymooSettings):
-    """An algorithm of pymoo for one objective; many-objective ones get one.
+    """An algorithm of pymoo for one objective.
 
     pymoo prefers feasible points by itself, as Deb's rules do. It is given the objective and the violation as the
     constraint rule in force sees them, for its whole population again in each generation.

@@ -23,12 +23,12 @@ from tests.metaheuristics.problems import Function, disc, infeasible, rosenbrock
 
 ALL: dict[str, Callable[[], Algorithm]] = {
     **ALGORITHMS,
-    **{name: partial(make_algorithm, name) for name in ("cma", "de", "pymoo:GA", "pymoo:PSO", "pymoo:NSGA2")},
+    **{name: partial(make_algorithm, name) for name in ("cma", "de", "pymoo:GA", "pymoo:PSO")},
     "ga-generational": partial(GeneticAlgorithm, survival="generational", elites=2),
 }
 BUDGET = 620  # not a multiple of any population, so that the last generation is cut short
 
-OTHERS = ("cma", "pymoo:GA", "pymoo:PSO", "pymoo:NSGA2")  # of other packages, which take ten times as long
+OTHERS = ("cma", "pymoo:GA", "pymoo:PSO")  # of other packages, which take ten times as long
 
 every_algorithm = pytest.mark.parametrize(
     "algorithm", [pytest.param(name, marks=[pytest.mark.slow] if name in OTHERS else []) for name in ALL], indirect=True
@@ -190,7 +190,6 @@ ENDS = {
     "de": (1e-8, 1e-8, 1e-6),
     "pymoo:GA": (1e-3, 0.03, 0.01),
     "pymoo:PSO": (1e-6, 1e-3, 1e-3),
-    "pymoo:NSGA2": (1e-3, 0.03, 0.01),
 }
 converging = pytest.mark.parametrize("name", [name for name in ALL if name != "random"])
 

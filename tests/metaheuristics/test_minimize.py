@@ -12,7 +12,7 @@ from tests.metaheuristics.problems import Function, disc, infeasible, sphere
 SWARM = ParticleSwarm(population=10)
 
 
-def first_generation(algorithm: Algorithm, seed: int | np.random.SeedSequence) -> Array:
+def first_generation(algorithm: Algorithm, seed: int) -> Array:
     """Starting points of a run."""
     generations: list[Array] = []
     minimize(
@@ -28,13 +28,6 @@ def test_starting_points_depend_on_the_seed_alone() -> None:
     assert not np.array_equal(first_generation(ParticleSwarm(), 8), swarm)
     assert np.unique(swarm).size == swarm.size
     assert (swarm.min(axis=0) < -1.5).all() and (swarm.max(axis=0) > 1.5).all()
-
-
-def test_a_seed_sequence_is_not_consumed_and_equals_its_number() -> None:
-    sequence = np.random.SeedSequence(7)
-    runs = [minimize(disc(), SWARM, evaluations=100, seed=seed) for seed in (sequence, sequence, 7)]
-    assert len({tuple(run.x) for run in runs}) == 1
-    assert sequence.n_children_spawned == 0
 
 
 def test_target_needs_feasibility() -> None:
