@@ -142,12 +142,16 @@ class RecordedMotion:
 def estimate_noise(samples: Array) -> Array:
     """Return the standard deviation (n,) of noise and rounding in samples (T, n) of a smooth motion.
 
-    Fourth differences of equal steps contain hardly anything else; their median is that of most samples.
+    High differences of equal steps contain hardly anything else; the order whose median is least, since a coarsely sampled
+    motion leaves a part of itself in the lower ones.
     """
     if len(samples) < 2 * LEAST_ROWS:
         return np.zeros(samples.shape[1])
-    differences = np.median(np.abs(np.diff(samples, 4, axis=0)), axis=0)
-    return np.asarray(differences / (math.sqrt(70.0) * MEDIAN))
+    estimates = [
+        np.median(np.abs(np.diff(samples, order, axis=0)), axis=0) / (math.sqrt(math.comb(2 * order, order)) * MEDIAN)
+        for order in (4, 6, 8)
+    ]
+    return np.asarray(np.min(estimates, axis=0))
 
 
 def count_swings(heights: Array, lifted: float) -> int:
