@@ -54,7 +54,10 @@ class Runner:
         Raises:
             InputError: a run failed before it had a point.
         """
-        study = Study(runs=tuple(tasks), folder=self.folder, jobs=self.jobs, scheduler=self.scheduler)
+        chosen = tuple(tasks)
+        if not chosen:
+            return Runs()
+        study = Study(runs=chosen, folder=self.folder, jobs=self.jobs, scheduler=self.scheduler)
         finished, runs = count(1), Runs()
         records = run_study(
             study,

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
+import nlp_gait as package
 from compare.study.citations import cite_problems, find_citations
 from nlp_gait.gaitbench.facts import DEFINITIONS
 from nlp_gait.providers import PROBLEMS
@@ -55,7 +56,7 @@ def test_the_citation_file_is_valid_and_equal_to_the_packages_data() -> None:
     released = {"year": CFF["date-released"][:4], "note": f"Version {CFF['version']}"}
     assert software == {"author": CFF["authors"][0]["name"], "title": CFF["title"], **released}
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert CFF["version"] == project["project"]["version"] and CFF["license"] == project["project"]["license"]
+    assert CFF["version"] == package.__version__ and CFF["license"] == project["project"]["license"]
     assert "study/citations.toml" in project["tool"]["setuptools"]["package-data"]["compare"]
 
 

@@ -115,7 +115,7 @@ def test_many_hostile_plug_ins_leave_the_others_records_whole(
         (
             ALL,
             "import time\n while True:\n  try: f(lower), time.sleep(0.01)\n  except BaseException: pass",
-            "time limit reached; the search did not return and was ended",
+            "time limit reached",
         ),
         (ALL, "for _ in range(9999):\n  try: f(lower)\n  except BaseException: pass", "evaluation budget used"),
         (ALL, "return lower", "f was never called: the function returned"),
@@ -130,7 +130,7 @@ def test_a_plain_function_is_stopped_at_its_budget_even_if_it_ignores_it(
     stop = STOP if "time limit" in said else PATIENT
     record = run_once(Run(problem=WALK, solver=f"{tmp_path / 'own.py'}:search", stop=stop))
     assert re.search(said, record.status)
-    is_kept = said in ("evaluation budget used", "time limit reached; the search did not return and was ended")
+    is_kept = said in ("evaluation budget used", "time limit reached")
     assert record.reported_feasible == is_kept and (said != "evaluation budget used" or record.counts["f"] == 200)
 
 
