@@ -177,7 +177,7 @@ def _find_nearest(placed: PlacedJoint, other: PlacedJoint | None = None) -> Arra
 
 def check_sizes(robot: str, links: Links, joints: Joints, notes: list[str]) -> None:
     """Raise RobotDataError for a link whose matter is spread further than the robot is large, if its inertia matters."""
-    places = [chain[0].place for chain in _find_chains(joints).values()]
+    places = [np.zeros(3)] + [chain[0].place for chain in _find_chains(joints).values()]
     size = float(np.linalg.norm(np.ptp(places, axis=0)))
     mass_kg = sum(link.mass_kg for link in links.values())
     for name, link in links.items():

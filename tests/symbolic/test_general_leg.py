@@ -169,7 +169,7 @@ def test_poses_beyond_the_joints_limits_do_not_count() -> None:
         foot_m=np.array([0.0025, -0.1202, -0.8895]),
         limits_rad=np.array([(-0.87, 0.35), (-1.05, 0.35), (-2.62, 0.79), (0.0, 2.45), (-1.05, 0.52), (-0.44, 0.44)]),
     )
-    assert count_newton_steps(leg) == 7
+    assert count_newton_steps(leg) == 5
     free = replace(
         leg, limits_rad=np.full((6, 2), math.pi) * [-1.0, 1.0]
     )  # without limits some angles reach those poses
