@@ -29,7 +29,7 @@ LOADING = {
     "video": "src",
     "object": "data",
 }
-FEWEST_LETTERS = 200  # of a page's main part
+FEWEST_LETTERS = 100  # of a page; that of an animation has little text beside its figure
 ALIKE = 10  # pages of a folder whose accessibility is examined, which takes longest, each on one of the screens in turn
 
 
