@@ -64,7 +64,9 @@ def lock_folder(path: Path, name: str = LOCK) -> Iterator[None]:
         try:
             lock.acquire(timeout=WAIT_SILENTLY_S, poll_interval=LOCK_CHECKED_EVERY_S)
         except Timeout:
-            warn_once(f"waiting for another process that works in {path}; delete {path / name} if there is none")
+            warn_once(
+                f"waiting for another process that works in {path}; delete {path / name} if no process works there"
+            )
             lock.acquire(poll_interval=LOCK_CHECKED_EVERY_S)
     try:
         yield

@@ -34,8 +34,8 @@ CONDITIONS: Mapping[str, Conditions] = {
 }
 
 
-def walked(steps: int, conditions: Conditions, feedback: Balance | None) -> Walk:
-    """So many steps of the cheapest cycle at ``SPEED``."""
+def simulate_walk(steps: int, conditions: Conditions, feedback: Balance | None) -> Walk:
+    """Simulate so many steps of the cheapest cycle at ``SPEED``."""
     plan, drive = make_plan(optimal_cycles((SPEED,))[SPEED], steps), Drive(feedback=feedback)
     return measure_walk(plan, simulate_plan(plan, conditions, drive), drive, steps)
 
@@ -55,4 +55,6 @@ def disturbed() -> Iterator[str]:
     columns = ("steps", "J/m", "distance")
     yield header("condition", *(f"open loop: {columns[0]}", *columns[1:]), *(f"feedback: {columns[0]}", *columns[1:]))
     for label, conditions in CONDITIONS.items():
-        yield cells(label, *(text for own in (None, Balance()) for text in format_walk(walked(STEPS, conditions, own))))
+        yield cells(
+            label, *(text for own in (None, Balance()) for text in format_walk(simulate_walk(STEPS, conditions, own)))
+        )

@@ -167,7 +167,7 @@ class Certainty(Question[FoundCertainty]):
         )
 
     def _prove(self, optima: Sequence[LocalOptimum], work: Work) -> Certificate | None:
-        """Return the proof from the best optimum, or from the shipped one; None if there is none."""
+        """Return the proof from the best optimum, or from the shipped one; None without either."""
         problem, folder = self.problem, work.memo.folder
         if not optima:
             return None

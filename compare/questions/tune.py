@@ -44,9 +44,8 @@ class TunedGait:
     simulations: int
     J_per_m: float  #: score of the search
     violation: float
-    history: tuple[
-        tuple[int, float], ...
-    ] = ()  #: simulations and the least energy so far of a gait that does what it may
+    #: Simulations and the least energy so far of a gait that does what it may
+    history: tuple[tuple[int, float], ...] = ()
     values: Mapping[str, float] = field(default_factory=dict)  #: tuned limits
 
 
@@ -88,7 +87,7 @@ class Tune(Question[list[ScoredGait]]):
     @property
     def total(self) -> int:
         """Rows, and the solves of tuned limits."""
-        return 2 + math.prod(len(axis.values) for axis in self.limits) * bool(self.limits) + len(self._searches)
+        return 2 + len(self._grid) + len(self._searches)
 
     @property
     def _searches(self) -> list[tuple[str, int]]:

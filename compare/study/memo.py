@@ -73,7 +73,7 @@ def _call(function: Callable[[], Any], _: object) -> Any:
 
 
 def _read(path: Path | None) -> list[Any]:
-    """Return a list of the stored value; empty if there is none, or its file is damaged."""
+    """Return a list of the stored value; empty if it is not stored, or its file is damaged."""
     if path is None or not path.exists():
         return []
     try:

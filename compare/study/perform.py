@@ -149,7 +149,7 @@ class IsolatedRun:
         return catch_errors(self.run, self.inputs, lambda: judge_search(self.run, self.inputs, end))
 
 
-def perform(run: Run, inputs: Inputs, search: RunRecord | None, _: Send) -> RunRecord:
+def perform(run: Run, inputs: Inputs, search: RunRecord | None, _: Send | None = None) -> RunRecord:
     """Perform a run of a solver of this package; whatever fails in it becomes its record.
 
     ``search`` is the record of the search that IPOPT continues, if it was run before.

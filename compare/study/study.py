@@ -304,7 +304,7 @@ def _run_items(items: Sequence[Item], study: Study) -> Iterator[tuple[int, RunRe
         movable = has_fork() or isinstance(run.problem.name, str)
         if not is_isolated and (study.jobs == 1 or not movable):
             with count_interrupts() as presses:
-                record = perform(run, inputs, search, print)
+                record = perform(run, inputs, search)
                 if presses:  # user code has swallowed it
                     raise KeyboardInterrupt
             yield position, record
@@ -364,4 +364,4 @@ def _perform_there(folder: str, run: Run, inputs: Inputs, search: RunRecord | No
         raise WorkerError(
             "a worker has another version of nlp-gait or of your files than this machine; install the same"
         )
-    return perform(run, inputs, search, print)
+    return perform(run, inputs, search)

@@ -149,10 +149,6 @@ def _list_missing(folder: Path, records: Sequence[RunRecord]) -> Iterator[Differ
             )
 
 
-def _name_inputs(record: RunRecord) -> str:
-    return f"{record.inputs.solver} with seed {record.seed}"
-
-
 def _shorten(solver: object) -> object:
     return shorten_reference(solver) if isinstance(solver, str) else solver
 

@@ -176,15 +176,15 @@ def _find_nearest(placed: PlacedJoint, other: PlacedJoint | None = None) -> Arra
 
 
 def check_sizes(robot: str, links: Links, joints: Joints, notes: list[str]) -> None:
-    """Raise RobotDataError for a link whose matter is spread further than the robot is large, if its inertia matters."""
-    places = [np.zeros(3)] + [chain[0].place for chain in _find_chains(joints).values()]
+    """Raise RobotDataError for a link spread further than the root and the joints of the robot, if its inertia matters."""
+    places = [np.zeros(3), *(chain[0].place for chain in _find_chains(joints).values())]
     size = float(np.linalg.norm(np.ptp(places, axis=0)))
     mass_kg = sum(link.mass_kg for link in links.values())
     for name, link in links.items():
         radius = math.sqrt(max(float(np.trace(link.inertia_matrix)), 0.0) / (2 * link.mass_kg))
         if radius <= size:
             continue
-        fault = f"the tensor of {name!r} spreads {link.mass_kg:.3g} kg by {radius:.3g} m, and all joints are within {size:.3g} m"
+        fault = f"the tensor of {name!r} spreads {link.mass_kg:.3g} kg by {radius:.3g} m, root and joints by {size:.3g} m"
         if link.mass_kg * radius**2 > NEGLIGIBLE_INERTIA * mass_kg * size**2:
             raise RobotDataError(
                 f"robot {robot!r}: {fault}; tensors are in kg m^2: is it in kg mm^2, or of another scale?"

@@ -78,7 +78,7 @@ def test_the_rows_of_a_nao_phase_are_all_there_and_named(name: str, rows: int) -
 def test_an_objective_in_units_that_are_too_large_is_refused_everywhere() -> None:
     """IPOPT would converge 170 % above the optimum, and every search would have reached it."""
 
-    def scaled(unit: float) -> GaitProblem:
+    def make_scaled(unit: float) -> GaitProblem:
         return toy(
             lambda x, y, limit, ops: (unit * ((x - 1) ** 2 + (y - 1) ** 2 + 1), (row(x + y, lower=3 + 0 * limit),))
         )
@@ -87,9 +87,9 @@ def test_an_objective_in_units_that_are_too_large_is_refused_everywhere() -> Non
         with pytest.raises(
             InputError, match="toy: cost changes by .*e-12 J only .*; use a unit in which it changes by"
         ):
-            use(scaled(1e-12))
-    assert solve(scaled(1e-3)).objective == pytest.approx(1.5e-3, rel=1e-6)
-    assert solve(scaled(0.0)).converged  # a constant: any feasible point is an optimum
+            use(make_scaled(1e-12))
+    assert solve(make_scaled(1e-3)).objective == pytest.approx(1.5e-3, rel=1e-6)
+    assert solve(make_scaled(0.0)).converged  # a constant: any feasible point is an optimum
 
 
 def test_a_bound_that_is_nan_is_not_satisfied() -> None:
