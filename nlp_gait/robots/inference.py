@@ -184,7 +184,9 @@ def check_sizes(robot: str, links: Links, joints: Joints, notes: list[str]) -> N
         radius = math.sqrt(max(float(np.trace(link.inertia_matrix)), 0.0) / (2 * link.mass_kg))
         if radius <= size:
             continue
-        fault = f"the tensor of {name!r} spreads {link.mass_kg:.3g} kg by {radius:.3g} m, root and joints by {size:.3g} m"
+        fault = (
+            f"the tensor of {name!r} spreads {link.mass_kg:.3g} kg by {radius:.3g} m, root and joints by {size:.3g} m"
+        )
         if link.mass_kg * radius**2 > NEGLIGIBLE_INERTIA * mass_kg * size**2:
             raise RobotDataError(
                 f"robot {robot!r}: {fault}; tensors are in kg m^2: is it in kg mm^2, or of another scale?"
