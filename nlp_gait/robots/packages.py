@@ -71,6 +71,8 @@ def _list_files(package: str) -> Mapping[str, Locate]:
 
 def find_kind(path: Path) -> str:
     """Return the kind of a robot's file, ``urdf`` or ``mjcf``, by its first tag; "" for another tag, or if it is not read."""
+    if not path.is_file():  # to open a pipe would wait for its writer
+        return ""
     try:
         with path.open("rb") as file:
             tag = FIRST_TAG.match(file.read(HEAD_BYTES))
