@@ -153,7 +153,7 @@ def test_what_is_not_a_leg_is_refused(robots: dict[str, Robot]) -> None:
 
 
 @pytest.mark.slow
-def test_poses_beyond_the_joints_limits_do_not_count() -> None:
+def test_a_few_poses_may_stay_open_but_not_many() -> None:
     """Right leg of Alexander (example-robot-data 6.0.0), whose hip axes pass each other by 0.16 m."""
     leg = Leg(
         joints=tuple(f"joint_{k}" for k in range(6)),
@@ -170,8 +170,6 @@ def test_poses_beyond_the_joints_limits_do_not_count() -> None:
         limits_rad=np.array([(-0.87, 0.35), (-1.05, 0.35), (-2.62, 0.79), (0.0, 2.45), (-1.05, 0.52), (-0.44, 0.44)]),
     )
     assert count_newton_steps(leg) == 5
-    free = replace(
-        leg, limits_rad=np.full((6, 2), math.pi) * [-1.0, 1.0]
-    )  # without limits some angles reach those poses
+    apart = leg.points + np.array([(0.0, 0.0, 0.5), (0.5, 0.0, 0.0), *np.zeros((4, 3))])
     with pytest.raises(InputError, match=r"is not solved in 8 Newton steps: its hip axes pass each other too far"):
-        count_newton_steps(free)
+        count_newton_steps(replace(leg, points=apart))
