@@ -1,6 +1,5 @@
 """A leg of any six turning joints: its foot is where it should be, its rates are right, and NAO's is the closed form's."""
 
-import math
 from dataclasses import replace
 from functools import cache
 
