@@ -35,7 +35,7 @@ CLASS = re.compile(r"^class (\w+)", re.MULTILINE)
 # First words of public functions. Not for commands and problems, which have names of their own, and formulas in `symbolic`.
 VERBS = frozenset(
     """
-    abbreviate add allow animate apply approximate are assemble assign audit average bind block bootstrap bound build call catch
+    abbreviate add allow animate apply approximate are assemble assign average bind block bootstrap bound build call catch
     certify challenge change check choose cite clip close cluster collect combine compare compile compute connect convert
     correct count cross decide decode defer define delay derive describe difference differentiate draw encode end escape
     estimate evaluate exit explain export extrapolate fail fill filter find fit fix flush follow forget format generate get

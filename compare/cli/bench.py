@@ -6,16 +6,13 @@ from typing import Annotated, Literal
 
 from typer import Option
 
-from compare.bench.audit import INSTANCES, audit_search
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, load_table, make_bench_study
 from compare.bench.leaderboard import make_leaderboard_page, rank_solvers
 from compare.cli.command import CONTINUE, OUTPUT, command
 from compare.cli.compare import run_in_folder
 from compare.cli.options import Evaluations, Jobs, Scheduler, parse_names
-from compare.cli.printing import Output, Rows, describe_command, show_progress
-from compare.report.document import Document, make_text_table
+from compare.cli.printing import Output, Rows, describe_command
 from compare.report.writing import add_origin, write_document
-from compare.study.run import check_run
 from compare.study.settings import SolverSpec
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
@@ -53,7 +50,6 @@ def bench(
     algorithm: str | None = None,
     *,
     chosen: Instances,
-    audit: bool = False,
     label: str = "",
     effort: BenchEffort,
 ) -> Output:
@@ -64,13 +60,8 @@ def bench(
 
     Examples: `nlp-gait bench --algorithm my.py:MyAlgo --suite small --out DIR`,
     `nlp-gait bench --algorithm my.py:MyAlgo --families walk12-long,ssp --seeds 0:5 --out DIR`,
-    `nlp-gait bench --algorithm pso --label pso-again`, `nlp-gait bench --audit --algorithm my.py:MyAlgo`
+    `nlp-gait bench --algorithm pso --label pso-again`
     """
-    return _audit(algorithm, effort.out) if audit else _rank(algorithm, label, chosen, effort)
-
-
-def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEffort) -> Output:
-    """Run what the baseline lacks on the instances, rank all, and write the leaderboard."""
     instances = choose_instances(chosen.suite, chosen.instances, chosen.families, chosen.seeds)
     shipped = effort.evaluations == EVALUATIONS and set(instances) <= load_table().keys()
     solvers = {} if shipped else {name: "" for name in parse_names(effort.against) if name != algorithm}
@@ -103,30 +94,4 @@ def _rank(algorithm: str | None, label: str, chosen: Instances, effort: BenchEff
         },
         parts=[table, *page.headline],
         written=write_document(out, add_origin(page, describe_command(), problems), "leaderboard"),
-    )
-
-
-def _audit(algorithm: str | None, folder: Path) -> Output:
-    """Audit a search, and write the page of its effects."""
-    if algorithm is None:
-        raise InputError("--audit examines one search: name it with --algorithm")
-    task = make_bench_study(INSTANCES[:1], SolverSpec(name=algorithm)).make_runs()[0]
-    if not task.is_search:
-        raise InputError(f"--audit examines searches, and {algorithm} uses gradients; choose a search")
-    check_run(task)
-    with show_progress("audit", len(INSTANCES) + 1) as advance:
-        audit = audit_search(task.make_search(), progress=advance)
-    rows = [(e.change, e.result, f"{e.a12:.2f}", f"{e.p:.2g}") for e in audit.effects]
-    effects = [{**asdict(effect), "result": effect.result} for effect in audit.effects]
-    title, header = f"{task.title}: gait problems in other places of the box", ("change", "result", "A12", "p")
-    noise = (
-        f"on noise, {100 * audit.edge:.1f} % of the variables end at a bound (unbiased: 0 %), {100 * audit.middle:.0f} % in "
-        "the middle 10 % of their ranges (unbiased: 10 %)"
-    )
-    verdict = "; ".join(audit.biases) or "no bias found"
-    page = Document(title=title, headline=(f"{task.title}: {verdict}.",), parts=(make_text_table(header, rows), noise))
-    return Output(
-        data={**asdict(audit), "effects": effects, "biases": list(audit.biases)},
-        parts=[Rows(title, header, rows), noise, verdict],
-        written=write_document(make_writable_folder(folder), add_origin(page, describe_command(), ()), "audit"),
     )
