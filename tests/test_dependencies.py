@@ -38,7 +38,6 @@ LAYERS = (
     "nlp_gait.loading",
     "metaheuristics",
     "compare.judge",
-    "compare.rounding",
     "compare.study",
     "compare.analysis",
     "compare.drawing",

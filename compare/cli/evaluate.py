@@ -16,12 +16,10 @@ from compare.cli.options import AnyProblem, parse_number, parse_numbers, parse_o
 from compare.cli.printing import Output, Rows, fail
 from compare.judge import Evaluation
 from compare.judge import evaluate as judge
-from compare.rounding import evaluate_rounded
 from compare.study.import_runs import FINALS, read_points
 from nlp_gait.export.formats import write_npz
 from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.files import format_csv, write_text
-from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.robots import load_robot
 
@@ -40,30 +38,20 @@ def evaluate(
     engine: bool = True,
     *,
     problem: AnyProblem,
-    rounded: Annotated[bool, Option("--rounded")] = False,
-    claimed: Annotated[str | None, Option(metavar="VALUE")] = None,
     signals: Annotated[Path | None, OUTPUT_FILE] = None,
     table: Annotated[Path | None, Option("--csv"), OUTPUT_FILE] = None,
 ) -> Output:
     """Evaluate candidates with the exact functions, at the problem's samples and on a dense grid.
 
-    Examples: `nlp-gait evaluate nao-ssp --x 0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4`, also with `--rounded`,
+    Examples: `nlp-gait evaluate nao-ssp --x 0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4`,
     `nlp-gait evaluate nao-ssp --x points.csv --csv judged.csv`, `nlp-gait evaluate --motion gait.csv --robot nao-v5`
     """
-    if claimed is not None and not rounded:
-        fail("--claimed compares an objective with all points of --rounded; add --rounded")
-    if rounded and motion is not None:
-        fail("--rounded refers to the digits of --x; leave it out for a motion")
     if motion is not None and x is None:
         return _evaluate_motion(problem, motion, touch_down, engine, signals)
     if x is None or motion is not None:
         fail("give a point with --x, or a motion with --motion")
     loaded = problem.spec().load()
     many = x.endswith(".csv")
-    if rounded:
-        if many or signals is not None or table is not None:
-            fail("--rounded takes one candidate as printed, and no --signals or --csv; give --x as numbers")
-        return _evaluate_rounded(loaded, x, claimed)
     if many and signals is not None:
         fail("--signals takes one candidate; give it as numbers")
     if signals is not None and loaded.display.motion is None:
@@ -79,24 +67,6 @@ def evaluate(
         return Output(data=judged[0].to_json(), parts=[*_describe(judged[0])], written=written)
     data = {"schema": 1, "points": [evaluation.to_json() for evaluation in judged]}
     return Output(data=data, parts=[_tabulate(judged)], written=written)
-
-
-def _evaluate_rounded(problem: GaitProblem, x: str, claimed: str | None) -> Output:
-    verdict = evaluate_rounded(problem, x.split(","), claimed)
-    unit = verdict.objective["unit"]
-    bounds = "cannot be enclosed"
-    if verdict.enclosure is not None:
-        bounds = "enclosed: {} to {}".format(*(with_unit(end, unit) for end in verdict.enclosure))
-    parts = [
-        f"{verdict.problem}, all points that round to the printed digits: {verdict.objective['name']} from "
-        f"{with_unit(verdict.best, unit)} (best) to {with_unit(verdict.worst, unit)} (worst) at evaluated points; {bounds}",
-        f"feasible {verdict.feasible}, {verdict.how}",
-        f"at the best point that was found {verdict.at_best}",
-        f"at the worst point that was found {verdict.at_worst}",
-    ]
-    if verdict.claim is not None:
-        parts.append(f"the claimed {claimed}: {verdict.claim}")
-    return Output(data=verdict.to_json(), parts=parts)
 
 
 def _evaluate_motion(

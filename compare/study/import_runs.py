@@ -3,13 +3,13 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from compare.judge import evaluate
-from compare.rounding import find_feasible
 from compare.study.record import History, RunRecord, Times, describe_evaluation, list_versions
 from compare.study.references import SAME_VALUE, find_reference
 from compare.study.run import LABEL, Inputs, ProblemSpec
@@ -25,6 +25,8 @@ FINALS = ("run", "seed", "objective", "violation", "evaluations", "time_s")
 HISTORY = ("run", "evaluations", "objective")
 MOST_POINTS = 100_000
 ROUNDED = 1e-3  # relative difference of a history's end from the judged value that printed digits explain
+SAMPLES = 100  # random points and corners among those that round to printed digits
+FEW_DIGITS = 10  # of a printed number; more are exact for all that is judged
 # Least values of those that are numbers, not counts.
 LEAST = {"objective": -math.inf, "violation": 0.0, "time_s": 0.0}
 
@@ -132,9 +134,30 @@ def import_runs(
 
 def _choose_point(problem: GaitProblem, x: Array, printed: Sequence[str]) -> tuple[Array, str]:
     """Return a point, or if it is infeasible a feasible one that rounds to its printed digits, and a note on that."""
-    model = build_exact_model(problem)
-    near = None if model.at(x, problem.p).feasible else find_feasible(problem, printed)
+    near = None if build_exact_model(problem).at(x, problem.p).feasible else find_feasible(problem, printed)
     return (x, "") if near is None else (near, "; judged at a feasible point that rounds to its printed digits")
+
+
+def find_feasible(problem: GaitProblem, printed: Sequence[str]) -> Array | None:
+    """Return the point (n,) nearest to the printed one that rounds to it and is feasible; None if no point that is tried is.
+
+    All numbers have as many significant digits as the longest one: programs leave zeros at the end out. Points with more than
+    ``FEW_DIGITS`` digits stand for themselves.
+    """
+    x, model = np.array([float(text) for text in printed]), build_exact_model(problem)
+    digits = max(len(Decimal(text.strip()).as_tuple().digits) for text in printed)
+    if digits > FEW_DIGITS:
+        return None
+    half = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(np.abs(x), np.finfo(float).tiny))) + 1 - digits)
+    box = np.stack([x - half, x + half], axis=-1)
+    rng = np.random.default_rng(0)
+    places = np.concatenate([rng.uniform(size=(SAMPLES, len(x))), rng.integers(2, size=(SAMPLES, len(x)))])
+    points = np.clip(box[:, 0] + places * np.diff(box)[:, 0], problem.lower, problem.upper)
+    distances = np.abs((points - x) / np.diff(box)[:, 0]).max(axis=1)
+    for point in points[np.argsort(distances)]:
+        if ((box[:, 0] <= point) & (point <= box[:, 1])).all() and model.at(point, problem.p).feasible:
+            return point
+    return None
 
 
 def _make_history(
