@@ -8,7 +8,7 @@ from typer import Option
 
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, load_table, make_bench_study
 from compare.bench.leaderboard import make_leaderboard_page, rank_solvers
-from compare.cli.command import CONTINUE, OUTPUT, command
+from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
 from compare.cli.options import Evaluations, Jobs, Scheduler, parse_names
 from compare.cli.printing import Output, Rows, describe_command
@@ -74,7 +74,7 @@ def bench(
         name = settings.make_runs()[-1].title if algorithm is not None else None
         if name in BASELINE:
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
-        records = run_in_folder(settings, out, effort.jobs, effort.scheduler, CONTINUE)
+        records = run_in_folder(settings, out, effort.jobs, effort.scheduler)
     board = rank_solvers(instances, records, shipped=shipped)
     page = make_leaderboard_page(board, name, chosen.title, effort.evaluations)
     problems = [{"name": "gaitbench", "options": {"instance": id}} for id in instances]

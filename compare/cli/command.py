@@ -11,7 +11,6 @@ import inspect
 import io
 import math
 import os
-import select
 import sys
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
@@ -20,7 +19,7 @@ from copy import copy
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, NoReturn, get_args
 
 import typer
 from typer.models import ParameterInfo
@@ -34,17 +33,16 @@ from nlp_gait.option_groups import find_groups, list_options, pack_options, repl
 # In the annotation of a parameter that names the folder, or the file, that the command writes.
 OUTPUT, OUTPUT_FILE = "output", "output file"
 FORCE = "Replace files that exist."
-SESSION = "session"  # of one that decides how and where a study runs, not what it computes
-CONTINUE = "rerun the command to continue"
+CONTINUE = "rerun the same command to continue"
 
 
-def _add_flag(name: str, flag: str, words: str, *marks: str) -> inspect.Parameter:
-    annotation = Annotated[bool, typer.Option(flag, help=words), *marks]
+def _add_flag(name: str, flag: str, words: str) -> inspect.Parameter:
+    annotation = Annotated[bool, typer.Option(flag, help=words)]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=annotation)
 
 
 CONTEXT = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
-JSON = _add_flag("as_json", "--json", "Print one JSON object.", SESSION)
+JSON = _add_flag("as_json", "--json", "Print one JSON object.")
 # Errors of the system if a file cannot grow.
 NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
@@ -55,15 +53,11 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
     outputs = [option.name for option in options if OUTPUT_FILE in get_marks(option)]
     if outputs:
         options.append(_add_flag("force", "--force", FORCE))
-    adds_context = not any(option.annotation is typer.Context for option in options)
-    options += [CONTEXT] * adds_context
     groups = find_groups(function)
 
     @functools.wraps(function)
     def run(**given: Any) -> None:
-        as_json, context = given.pop("as_json"), given["context"]
-        if adds_context:
-            del given["context"]
+        as_json, context = given.pop("as_json"), given.pop("context")
         try:
             with raise_interrupts():
                 _check_values(context, given)
@@ -86,14 +80,13 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
             fail(str(interrupt) or "interrupted; all written files are complete", status=130)
         except OSError as error:
             _report_os_error(error)
-            raise typer.Exit(1) from None
         except Exception as error:
             searches = sys.modules.get("metaheuristics.errors")  # imports NumPy, which some commands do without
             if searches is None or not isinstance(error, searches.SearchError):
                 raise
             fail(str(error))
 
-    replace_signature(run, options)
+    replace_signature(run, [*options, CONTEXT])
     return run
 
 
@@ -150,50 +143,23 @@ def get_marks(option: inspect.Parameter) -> set[object]:
 
 
 def run_app(app: Callable[[], object]) -> None:
-    """Run the command line with outputs that accept all characters; report help that cannot be written."""
-    _open_outputs()
+    """Run the command line; characters that an output cannot encode become question marks."""
+    if sys.stdout is None:  # its descriptor would be that of the next file
+        sys.exit("nlp-gait: standard output is closed; send it to a file or to /dev/null")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     try:
         app()
     except OSError as error:
         _report_os_error(error)
-        sys.exit(1)
 
 
-def _report_os_error(error: OSError) -> None:
-    """Report a failed write; nothing if the output's reader has ended, as with ``| head``. Raise other errors."""
+def _report_os_error(error: OSError) -> NoReturn:
+    """End with status 1: with a sentence if there is no space, silently if the output has no reader, as with ``| head``."""
     if error.errno not in (*NO_SPACE, errno.EPIPE):
         raise error
-    closed = error.errno == errno.EPIPE and _is_output_closed()
-    # Drop the buffers, so that the interpreter does not fail on them at exit.
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what is still buffered
     if error.errno != errno.EPIPE:
         say_error(f"cannot write the output: {error.strerror}")
-    elif not closed:
-        say_error("a child process exited unexpectedly")
-
-
-def _is_output_closed() -> bool:
-    outputs = select.poll()
-    for stream in (sys.stdout, sys.stderr):
-        outputs.register(stream.fileno(), select.POLLOUT)
-    return any(event & (select.POLLERR | select.POLLHUP) for _, event in outputs.poll(0))
-
-
-def _open_outputs() -> None:
-    """Open the outputs and make them write a question mark for a character that they cannot encode.
-
-    A closed standard output is rejected: the next file opened would get its descriptor and the printed text. A closed
-    standard error is opened on the null device.
-    """
-    if sys.stderr is None:
-        nothing = os.open(os.devnull, os.O_WRONLY)
-        if nothing != 2:
-            os.dup2(nothing, 2)
-        sys.stderr = os.fdopen(2, "w", encoding="utf-8", closefd=False)
-    if sys.stdout is None:
-        sys.stdout = sys.stderr  # for the interpreter's exit
-        say_error("standard output is closed; send it to a file or to /dev/null")
-        sys.exit(1)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
+    sys.exit(1)

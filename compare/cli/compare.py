@@ -1,26 +1,24 @@
 """``nlp-gait compare``."""
 
-import inspect
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
 from typer import Argument, Option
 
 from compare.analysis.columns import PRINTED, format_rows, summarise
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import LiveGaps, describe_failures, describe_unknown, write_headlines
 from compare.cli import options
-from compare.cli.command import OUTPUT, SESSION, command, get_marks
+from compare.cli.command import CONTINUE, OUTPUT, command
 from compare.cli.printing import Output, Rows, describe_command, say, say_error, show_progress, stderr
 from compare.report import write_report
 from compare.study.import_runs import read_imported_records
 from compare.study.record import RunRecord
 from compare.study.run import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop
-from compare.study.settings import SolverSpec, StudySettings, read_settings, resolve_user_code
-from compare.study.study import FILE, Study, read_study_file, run_study, write_command
+from compare.study.settings import SolverSpec, StudySettings, read_settings
+from compare.study.study import Study, read_study_file, run_study, write_command
 from metaheuristics import list_installed_algorithms
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
@@ -28,6 +26,7 @@ from nlp_gait.files import make_writable_folder
 from nlp_gait.interrupts import Interrupted
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
+ALGORITHMS, STARTS = "pso,ga,aco", 20
 ALL, ALL_GRADIENT = "all", (IPOPT, "slsqp")
 
 
@@ -62,6 +61,9 @@ class SearchOptions:
         )
 
 
+DEFAULTS = SearchOptions(), options.ProblemOptions()
+
+
 def list_solver_names(algorithms: str, starts: int) -> list[str]:
     """Return IPOPT and the named solvers; without starts, only searches."""
     names = options.parse_names(algorithms)
@@ -76,43 +78,36 @@ def list_solver_names(algorithms: str, starts: int) -> list[str]:
 @command
 def compare(
     *,
-    context: typer.Context,
     problems: Annotated[list[str] | None, Argument(metavar="[PROBLEM]...")] = None,
-    algorithms: str = "pso,ga,aco",
-    starts: Annotated[int, Option(min=0, max=100000)] = 20,
+    algorithms: str = ALGORITHMS,
+    starts: Annotated[int, Option(min=0, max=100000)] = STARTS,
     searches: SearchOptions,
     changes: options.ProblemOptions,
-    config: Annotated[Path | None, SESSION] = None,
+    config: Path | None = None,
     out: Annotated[Path, OUTPUT] = options.RESULTS,
-    resume: Annotated[bool, Option("--resume"), SESSION] = False,
     jobs: options.Jobs = None,
-    code: options.Code = None,
     scheduler: options.Scheduler = None,
 ) -> Output:
     """Compare IPOPT and search algorithms: one record per run, tables, figures and a report.
 
-    Every finished run is stored: the same command, or `--resume`, continues an interrupted study. More runs, solvers, problems
-    or a larger budget in the same folder extend it; runs whose algorithm, problem or robot was edited run again. Your own
+    Every finished run is stored: the same command continues an interrupted study. More runs, solvers, problems or a larger
+    budget in the same folder extend it; runs whose algorithm, problem or robot was edited run again. Your own
     problems and algorithms are named as `FILE.py:NAME`, and a program in any language as `cmd:COMMAND`.
 
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
     `nlp-gait compare nao-ssp --algorithms pso --starts 0 --runs 1`,
-    `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
+    `nlp-gait compare --config study.toml --out study`
     """
-    if config is not None or resume:
-        _reject_study_options(context, "--config" if config is not None else "--resume")
-    options.name_all(code)
     if config is not None:
+        if (problems, algorithms, starts, searches, changes) != (None, ALGORITHMS, STARTS, *DEFAULTS):
+            raise InputError("--config has the problems, the solvers and their effort; leave out the options for them")
         settings = read_settings(config)
-    elif resume:
-        settings = read_interrupted_study(out)
     else:
         specs = [changes.make_spec(name) for name in problems or DEFAULT_PROBLEMS]
         settings = searches.make_study(specs, algorithms, starts)
     if stderr.is_terminal:
         say(f"watch it: nlp-gait report {out} --watch")
-    remedy = f"continue with `nlp-gait compare --resume --out {out}`"
-    records = run_in_folder(settings, out, jobs, scheduler, remedy)
+    records = run_in_folder(settings, out, jobs, scheduler)
     records += read_imported_records(out, records)
     written = write_report(out, records, read_study_file(out))
     comparisons = compare_problems(records, folder=out)
@@ -130,21 +125,8 @@ def compare(
     )
 
 
-def read_interrupted_study(out: Path) -> StudySettings:
-    """Return the settings of the study in a folder; raises InputError if the folder contains no study."""
-    settings = read_study_file(out).read_settings(f"study {str(out / FILE)!r}")
-    if settings is None:
-        raise InputError(f"{str(out)!r} contains no study to resume (study.json); omit --resume to start one")
-    return resolve_user_code(settings, f"the study in {str(out)!r}")
-
-
-def run_in_folder(
-    settings: StudySettings, out: Path, jobs: int | None, scheduler: str | None, remedy: str
-) -> list[RunRecord]:
-    """Run a study in a folder, and return all records, also of earlier commands.
-
-    The remedy says how to continue, in the sentence with which Ctrl-C ends the command.
-    """
+def run_in_folder(settings: StudySettings, out: Path, jobs: int | None, scheduler: str | None) -> list[RunRecord]:
+    """Run a study in a folder, and return all records, also of earlier commands."""
     study = Study(
         runs=settings.make_runs(), folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
     )
@@ -159,7 +141,7 @@ def run_in_folder(
                 on_stored=lambda count: advance("stored", count),
             )
         except Interrupted as interrupt:
-            sentence = f"{interrupt.sentence}; finished runs are stored in {out}; {remedy}"
+            sentence = f"{interrupt.sentence}; finished runs are stored in {out}; {CONTINUE}"
             raise KeyboardInterrupt(sentence) from interrupt
 
 
@@ -185,14 +167,3 @@ def describe_summaries(comparisons: Sequence[Comparison]) -> Iterator[str | Rows
         yield Rows(f"{comparison.problem}: judged by the exact functions", *format_rows(comparison, PRINTED))
         for sentence in [*describe_unknown(comparison), *([comparison.power] if comparison.power else [])]:
             yield f"{comparison.problem}, {sentence}"
-
-
-def _reject_study_options(context: typer.Context, flag: str) -> None:
-    session = {o.name for o in inspect.signature(compare).parameters.values() if get_marks(o) & {OUTPUT, SESSION}}
-    for parameter in context.command.params:
-        name = str(parameter.name)
-        source = context.get_parameter_source(name)
-        given = source is not None and source.name == "COMMANDLINE"
-        if name not in session and given and context.params.get(name) not in (None, [], ()):
-            option = parameter.metavar if parameter.param_type_name == "argument" else parameter.opts[0]
-            raise InputError(f"{flag} determines what the study computes; omit {option}")

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from typer import Argument, Option
 
-from compare.cli.command import OUTPUT, SESSION
+from compare.cli.command import OUTPUT
 from compare.study.record import load_result_or_record
 from compare.study.run import ProblemSpec
 from nlp_gait.backends.exact import build_exact_model
@@ -26,10 +26,10 @@ Starts = Annotated[int, Option(min=1, max=100000)]
 Runs = Annotated[int, Option(min=1, max=100000)]
 Seed = Annotated[int, Option(min=0)]
 Evaluations = Annotated[int, Option(min=1, max=10**12)]
-Jobs = Annotated[int | None, Option(min=1, max=4096), SESSION]
-Scheduler = Annotated[str | None, Option(metavar="ADDRESS"), SESSION]
+Jobs = Annotated[int | None, Option(min=1, max=4096)]
+Scheduler = Annotated[str | None, Option(metavar="ADDRESS")]
 OutFolder = Annotated[Path, OUTPUT]
-Code = Annotated[list[str] | None, Option(metavar="FILE.py:NAME"), SESSION]
+Code = Annotated[list[str] | None, Option(metavar="FILE.py:NAME")]
 ProblemName = Annotated[str, Argument(metavar="PROBLEM")]
 Robot = str | None
 Values = Annotated[list[str] | None, Option("--set", metavar="NAME=VALUE")]

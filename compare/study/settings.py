@@ -6,13 +6,11 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from compare.study.run import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Run, Stop, list_solvers
+from compare.study.run import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Run, Stop
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import check_plain, convert_errors, read_text
-from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.providers import PROBLEMS
-from nlp_gait.user_code import resolve_code
 
 SCHEMA = 1  # of study files; the default
 LARGEST_FILE = 2**17  # bytes; a study file has a few hundred
@@ -86,23 +84,6 @@ class StudySettings:
             "seed": self.seed,
             **self.stop.limits,
         }
-
-
-def resolve_user_code(settings: StudySettings, owner: str) -> StudySettings:
-    """Return settings from a folder with user code as this command names it; raises UserCodeError if it does not."""
-    return replace(
-        settings,
-        problems=tuple(_resolve_problem(p, owner) for p in settings.problems),
-        solvers=tuple(
-            s if s.name in list_solvers() else replace(s, name=resolve_code(s.name, "algorithm", owner))
-            for s in settings.solvers
-        ),
-    )
-
-
-def _resolve_problem(problem: ProblemSpec, owner: str) -> ProblemSpec:
-    name, options = resolve_stored(problem.address, problem.options, owner)
-    return replace(problem, name=name, options=options)
 
 
 def read_settings(path: Path) -> StudySettings:

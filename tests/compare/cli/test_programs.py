@@ -1,4 +1,4 @@
-"""A program as a solver of a study: by its command, with its files' hash, resumed and archived only where it is named."""
+"""A program as a solver of a study: by its command, with its files' hash, repeated and archived only where it is named."""
 
 import json
 import sys
@@ -37,8 +37,7 @@ def test_a_program_takes_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     points = read_points("study")
     assert len(points) == 2 and points == read_points("again")
 
-    assert "runs only if you name it" in one_sentence("compare", "--resume", "--out", "study")
-    nlp_gait("compare", "--resume", "--out", "study", "--code", command)
+    nlp_gait(*call, "--algorithms", command, "--out", "study")
     assert read_points("study") == points
     nlp_gait("verify", "study", "--pack", "study.zip", "--code", command)
     (row,) = as_json("verify", "study.zip")["rows"]
@@ -46,7 +45,7 @@ def test_a_program_takes_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     everything = "4 points evaluated and 4 of 4 runs repeated: nothing differs"
     assert as_json("verify", "study.zip", "--run-code")["sentence"] == everything
     Path("shared.py").write_text("ROWS = 30\n")
-    nlp_gait("compare", "--resume", "--out", "study", "--code", command)
+    nlp_gait(*call, "--algorithms", command, "--out", "study")
     assert len(read_points("study")) == 4
 
 

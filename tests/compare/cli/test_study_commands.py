@@ -37,15 +37,15 @@ def folder(coarse_pages: None, tmp_path_factory: pytest.TempPathFactory) -> Path
     return out / "out"
 
 
-def test_resume_needs_no_other_option_and_keeps_everything(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_command_keeps_everything(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = {path: path.stat().st_mtime_ns for path in folder.glob("records/*/*.json")}
     assert len(before) == 2
-    arguments = ["compare", "--resume", "--out", str(folder), "--jobs", "1"]
+    arguments = ["compare", "--config", str(folder.parent / "study.toml"), "--out", str(folder), "--jobs", "1"]
     monkeypatch.setattr(sys, "argv", ["nlp-gait", *arguments])  # which the study records
     nlp_gait(*arguments)
     assert {path: path.stat().st_mtime_ns for path in folder.glob("records/*/*.json")} == before
     study = json.loads((folder / "study.json").read_text())
-    assert "--resume" in study["command"] and study["date"] and len(study["runs"]) == 2
+    assert "--config" in study["command"] and study["date"] and len(study["runs"]) == 2
 
 
 def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path) -> None:

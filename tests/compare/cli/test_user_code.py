@@ -55,11 +55,8 @@ def test_a_study_file_names_them_and_a_folder_does_not(mine: Path) -> None:
     assert json.loads(record.read_text())["settings"]["population"] == 10
     nlp_gait("report", "study")
     mine.rename("moved.py")
-    refused = one_sentence("compare", "--resume", "--out", "study")
-    assert "runs only if you name it: add --code my.py:" in refused
-    code = ["--code", "moved.py:two_link", "--code", "moved.py:Shrinking"]
-    assert "my.py" in one_sentence("compare", "--resume", "--out", "study", *code)
+    assert "add --code my.py:two_link" in nlp_gait("report", "study", status=1).stderr
+    assert "my.py" in nlp_gait("report", "study", "--code", "moved.py:two_link", status=1).stderr
     Path("moved.py").rename("my.py")
-    code = ["--code", "my.py:two_link", "--code", "my.py:Shrinking"]
-    nlp_gait("compare", "--resume", "--out", "study", "--jobs", "1", *code)
+    nlp_gait("compare", "--config", "study.toml", "--out", "study", "--jobs", "1")
     assert sorted(path.name for path in Path("study").glob("records/two_link/*.json")) == names
