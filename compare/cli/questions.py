@@ -1,6 +1,6 @@
 """Commands that answer a question about a problem: how certain its optimum is, and how it changes."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,7 +11,7 @@ from compare.cli import options
 from compare.cli.command import CONTINUE, command, describe_stored
 from compare.cli.printing import Output, Rows, describe_command, show_progress
 from compare.cli.simulate import ConditionOptions, DriveOptions
-from compare.questions.certainty import Certainty, search_point
+from compare.questions.certainty import Certainty
 from compare.questions.pareto.pareto import Pareto, parse_searches
 from compare.questions.prices import Prices
 from compare.questions.question import Question, Work
@@ -21,12 +21,10 @@ from compare.report.writing import add_origin
 from compare.study.memo import Memo
 from metaheuristics import make_algorithm
 from nlp_gait.backends.identity import identify_problem
-from nlp_gait.errors import InputError, OutputError
-from nlp_gait.files import make_writable_folder
+from nlp_gait.errors import OutputError
 from nlp_gait.formulation import Result
 from nlp_gait.gaits.biped.cycle import SPEED
 from nlp_gait.interrupts import defer_interrupts
-from nlp_gait.proofs.certificate import check_certificate, load_certified_problem, read_certificate, repeat_proof
 
 FRONT_SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
 CYCLES = ("nao-cycle", "humanoid-cycle")  # whose speed is a parameter if the objective is the power
@@ -38,51 +36,15 @@ def certainty(
     starts: Annotated[int, Option(min=1, max=1000000)] = 10_000,
     time_limit: Annotated[float, Option(min=0.0, max=1000000000.0)] = 1800.0,
     seed: options.Seed = 0,
-    problem: options.AnyProblem,
-    check: Path | None = None,
-    complete: Annotated[bool, Option("--complete")] = False,
-    code: options.Code = None,
+    problem: options.NamedProblem,
     out: options.OutFolder = Path("certainty"),
 ) -> Output:
     """Gather evidence that the best optimum is the global one: many starts, and a proof for few variables.
 
-    Examples: `nlp-gait certainty walk12 --set lambda=1`, `nlp-gait certainty nao-ssp --starts 1000`,
-    `nlp-gait certainty --check certainty/walk12-certificate.json`
+    Examples: `nlp-gait certainty walk12 --set lambda=1`, `nlp-gait certainty nao-ssp --starts 1000`
     """
-    if check is not None:
-        if problem != options.AnyProblem():
-            raise InputError("--check takes the problem and its options from the certificate; leave them out")
-        options.name_all(code)
-        return _check(check, seed, out if complete else None)
-    if complete:
-        raise InputError("--complete repeats the proof of a certificate; name its file by --check FILE")
-    question = Certainty(problem=problem.spec().load(), starts=starts, time_limit_s=time_limit, seed=seed)
+    question = Certainty(problem=problem.load(), starts=starts, time_limit_s=time_limit, seed=seed)
     return run_question(question, out)
-
-
-def _check(path: Path, seed: int, repeat_in: Path | None) -> Output:
-    file = read_certificate(path)
-    proof, points = file.certificate, {"a search": search_point(load_certified_problem(file), seed)}
-    check, repeated = check_certificate(file, points=points, seed=seed), None
-    if repeat_in is not None:
-        make_writable_folder(repeat_in)
-        with show_progress("boxes", None) as advance:
-            repeated = repeat_proof(file, progress=advance, checkpoint=repeat_in / f".{path.stem}.open")
-    parts = [
-        f"{file.problem['name']}: bound {proof.bound:.9g}, incumbent {proof.objective:.9g}. No better point was found; the best "
-        f"one is of {check.source}, {check.best:.9g}. {check.paths} paths of up to {check.deepest} halvings end; "
-        f"{check.pieces:,} boxes dropped on them are proven to contain nothing better; they suggest about {check.boxes:,.0f} "
-        f"boxes in total (within a factor of ten), the certificate has {proof.boxes:,}"
-        + ("" if check.same_prover else "; it was made by another version of the prover")
-    ]
-    if repeated is not None:
-        parts.append(
-            f"The whole proof was repeated: {repeated.boxes:,} boxes, {repeated.cpu_s:.0f} s of the processor; no feasible "
-            f"point is better than {repeated.bound:.9g}"
-        )
-    return Output(
-        data={"schema": 1, **asdict(check), "repeated": None if repeated is None else asdict(repeated)}, parts=parts
-    )
 
 
 @command

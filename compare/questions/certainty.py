@@ -14,15 +14,12 @@ from compare.questions.question import Answer, Question, Work
 from compare.report.document import make_text_table
 from compare.study.references import find_reference
 from compare.study.run import describe_problem
-from metaheuristics.minimize import minimize
-from metaheuristics.registry import make_algorithm
 from nlp_gait.backends.identity import hash_json, identify_problem, make_key
-from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.files import replace_nan
-from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaitbench.facts import SIX_DIGITS
 from nlp_gait.proofs.bounds import has_power_form
 from nlp_gait.proofs.branch_and_bound import TOLERANCE, Certificate, certify
@@ -39,7 +36,6 @@ BATCH = 250  # starts that are stored together
 SAME_OBJECTIVE = 1e-5
 SAME_X = 0.01
 CONFIDENCE = 0.95
-CHECK_EVALUATIONS = 20_000  # of a search that a certificate is compared with
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,12 +207,6 @@ class Certainty(Question[FoundCertainty]):
             results=certificates,
             data=findings.to_json(),
         )
-
-
-def search_point(problem: GaitProblem, seed: int = 0) -> Array:
-    """Return the best point (n,) of a short search by PSO, which shares only the exact functions with IPOPT and proofs."""
-    search = minimize(compile_objective(problem), make_algorithm("pso"), evaluations=CHECK_EVALUATIONS, seed=seed)
-    return np.array(search.x)
 
 
 def run_stored_starts(

@@ -99,7 +99,7 @@ def test_a_question_writes_what_it_has_or_counts_what_is_stored(
     (tmp_path / "store" / "solve-1.json").write_text("{}")
     press_after(monkeypatch, owner, name, calls)
     done = run(*line.split(), "--out", str(tmp_path))
-    match = re.fullmatch(rf"nlp-gait: interrupted ?{said}; rerun the command to continue\n", done.stderr)
+    match = re.fullmatch(rf"nlp-gait: interrupted ?{said}; rerun the same command to continue\n", done.stderr)
     assert match is not None and f" in {tmp_path};" in done.stderr, done.stderr
     if table:
         (file,) = tmp_path.glob(f"*-{table}.csv")
@@ -134,7 +134,7 @@ def test_reproduce_reports_its_stored_results(tmp_path: Path, monkeypatch: pytes
     module = import_module("compare.papers.nao.nao")
     monkeypatch.setattr(module, "REPRODUCTION", replace(load_reproduction("nao"), compute=run_two))
     done = run("reproduce", "nao", "--out", str(tmp_path))
-    assert f"1 finished results are stored in {tmp_path}; rerun the command to continue" in done.stderr
+    assert f"1 finished results are stored in {tmp_path}; rerun the same command to continue" in done.stderr
     assert [path.name.partition("-")[0] for path in (tmp_path / "store").iterdir()] == ["one"]
 
 

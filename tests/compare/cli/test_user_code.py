@@ -55,8 +55,7 @@ def test_a_study_file_names_them_and_a_folder_does_not(mine: Path) -> None:
     assert json.loads(record.read_text())["settings"]["population"] == 10
     nlp_gait("report", "study")
     mine.rename("moved.py")
-    assert "add --code my.py:two_link" in nlp_gait("report", "study", status=1).stderr
-    assert "my.py" in nlp_gait("report", "study", "--code", "moved.py:two_link", status=1).stderr
+    assert "my.py" in one_sentence("compare", "--config", "study.toml", "--out", "study")
     Path("moved.py").rename("my.py")
     nlp_gait("compare", "--config", "study.toml", "--out", "study", "--jobs", "1")
     assert sorted(path.name for path in Path("study").glob("records/two_link/*.json")) == names
