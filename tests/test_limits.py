@@ -136,6 +136,7 @@ def test_friction_and_height_are_those_of_mujoco() -> None:
     np.testing.assert_allclose([rows[f"foot_clearance[sole, {k}]"] for k in range(1, 10)], above[1:-1], atol=1e-9)
 
 
+@pytest.mark.commit
 @pytest.mark.slow
 def test_a_limit_costs_what_it_must_and_is_guaranteed_between_samples() -> None:
     problem = nlp_gait.load("nao-ssp", intervals=4)

@@ -68,6 +68,7 @@ def draw_points(count: int) -> Array:
     return np.vstack([instance.best_x, random])
 
 
+@pytest.mark.commit
 def test_objective_violation_and_rows_are_those_of_python(opened: Visit) -> None:
     """More points than one call takes; rows in the order of their names."""
     instance, X = gaitbench.load(playground.ID), draw_points(300)
@@ -199,6 +200,7 @@ def test_the_page_fits_a_large_screen(opened: Visit, file: Path) -> None:
     check_page(opened, "1280 light")
 
 
+@pytest.mark.commit
 def test_the_page_fits_a_phone(browser: Any, file: Path) -> None:
     with visit(browser, file, "400 dark") as found:
         wait_until(found.page, "document.body.dataset.ready === 'yes'")

@@ -71,6 +71,7 @@ def test_an_example_is_short(name: str) -> None:
     assert sum(1 for line in lines if line and not line.startswith("#")) <= MOST_LINES
 
 
+@pytest.mark.commit
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EXPECTED)
 def test_example(

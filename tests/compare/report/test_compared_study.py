@@ -16,6 +16,7 @@ def study() -> ComparedStudy:
     return nlp_gait.compare(["nao-dsp", "nao-ssp"], solvers, runs=3, starts=1, evaluations=300)
 
 
+@pytest.mark.commit
 @pytest.mark.slow
 def test_one_call_compares_searches_with_ipopt(study: ComparedStudy, tmp_path: Path) -> None:
     assert [len(comparison.solvers) for comparison in study.comparisons] == [3, 3]

@@ -68,6 +68,7 @@ def search(evaluate, lower, upper, evaluations, seed):
 """
 
 
+@pytest.mark.commit
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of Dask's own clean-up
 def test_workers_find_user_code_and_killed_processes_lose_no_run(

@@ -52,6 +52,7 @@ def describe(verification: Verification) -> str:
     return "\n".join(" ".join(row) for row in verification.rows)
 
 
+@pytest.mark.commit
 def test_an_honest_study_holds_and_all_of_its_runs_are_repeated(sound: Path) -> None:
     verification = verify_study(sound)
     assert verification.holds and not verification.rows
