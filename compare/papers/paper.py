@@ -234,21 +234,20 @@ class Paper(Generic[E, R]):
         return compare_alternatives(choice, {literal: first, **others})
 
     def conclude(self, overall: Mapping[str, Judgement]) -> list[str]:
-        """Return up to three sentences: which headlines hold, which do not, and which are open."""
-        groups: dict[str, list[str]] = {}
+        """Return up to three sentences: which headlines hold, which do not, and which are open, grouped by what they depend on."""
+        holding, failing, open_by_cause = list[str](), list[str](), dict[str, list[str]]()
         for id in self.headlines:
             claim, one = self.book.claims[id].claim, overall[id]
             if one.verdict is Ruling.HOLDS:
-                groups.setdefault("Holds", []).append(claim)
+                holding.append(claim)
             elif one.verdict in (Ruling.FAILS, Ruling.SIZE_DIFFERS):
-                words = " (only the direction does)" if one.verdict is Ruling.SIZE_DIFFERS else ""
-                groups.setdefault("Does not hold", []).append(claim + words)
+                failing.append(claim + " (only the direction does)" * (one.verdict is Ruling.SIZE_DIFFERS))
             else:
                 on = f" {one.here.partition(':')[0]}" if one.verdict is Ruling.DEPENDS else ""
-                groups.setdefault("Open", []).append(f"{claim} ({one.verdict}{on})")
-        return [
-            f"**{name}:** {'; '.join(groups[name])}." for name in ("Holds", "Does not hold", "Open") if name in groups
-        ]
+                open_by_cause.setdefault(f"{one.verdict}{on}", []).append(claim)
+        each = [f"{'; '.join(group)} ({'each ' * (len(group) > 1)}{cause})" for cause, group in open_by_cause.items()]
+        groups = {"Holds": holding, "Does not hold": failing, "Open": each}
+        return [f"**{name}:** {'; '.join(claims)}." for name, claims in groups.items() if claims]
 
     def _list_readings(self, id: str) -> Mapping[str, str]:
         return (self.run_readings or self.readings) if id in self.book.on_runs else self.readings
@@ -297,7 +296,7 @@ class Paper(Generic[E, R]):
         words = []
         for label, sentence in self._list_readings(ids[0]).items():
             ending = f"; **excluded by the print**: {decided.excluded[label]}" if label in decided.excluded else ""
-            ending += f"; varies {self.choices[label]}, which is not printed" if label in self.choices else ""
+            ending += f"; not printed: {self.choices[label]}" if label in self.choices else ""
             words.append(f"- *{label}*: {sentence}{ending}")
         parts = (Prose("\n".join(words)), tabulate(name, "", rows, prose=True))
         return [Section(title=title, parts=parts, folded=True)]

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from compare.analysis.units import name_in_words
 from compare.drawing.charts import Chart, Series
 from compare.papers.nao.results import (
     FOLDER,
@@ -75,9 +76,14 @@ def draw_convergence(result: NaoResults, number: str, phase: str) -> Figure:
 
 def draw_cloud(result: NaoResults, number: str, phase: str, first: int, last: int) -> Figure:
     """Return the power of feasible gaits of one run of each search over some variables."""
-    variables = make_spec(phase, result.reading).load().variables
-    charts = [_make_cloud(result, phase, k, f"{variables[k].name} [{variables[k].unit}]") for k in range(first, last)]
-    caption = f"Fig. {number}, {PHASES[phase]}: feasible gaits of one run of PSO and GA; printed solutions and powers as points"
+    variables = make_spec(phase, result.reading).load().variables[first:last]
+    labels = [f"{variable.name} [{variable.unit}]" for variable in variables]
+    charts = [_make_cloud(result, phase, k, label) for k, label in enumerate(labels, start=first)]
+    names = ", ".join(name_in_words(variable.name, variable.unit) for variable in variables)
+    caption = (
+        f"Fig. {number}, {PHASES[phase]}: power over {names}; feasible gaits of one run of PSO and GA, printed solutions and "
+        "powers as points"
+    )
     return make_chart_figure(f"figure-{number}", caption, charts)
 
 

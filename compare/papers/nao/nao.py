@@ -366,7 +366,7 @@ REPRODUCTION: Paper[NaoEffort, NaoResults] = Paper(
     compute=compute,
     headlines=(
         *("margins-ssp", "pso-optimal-ssp", "better-ssp", "better-dsp", "same-optimum-ssp"),
-        *("swing-24", "swing-ga", "simulator", "higher-hip-ssp", "power-level-ssp"),
+        *("swing-24", "swing-ga", "simulator", "power-level-ssp"),
     ),
     show=show,
 )

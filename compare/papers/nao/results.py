@@ -46,7 +46,7 @@ RECONSTRUCTED, PHYSICAL = READINGS = {
 PRINTED_OPTIONS: Mapping[str, Any] = {"intervals": 9, "zmp_gravity": "printed"}
 SEARCHES = ("PSO", "GA")
 # Searches by reading of the claims on runs: swarm, GA, and words. All are in the reconstructed reading.
-OPEN_GA = "the GA's crossover rate, survival and constraint handling"
+OPEN_GA = "the GA's settings"
 COMPARED = {
     "damped": (
         "pso",

@@ -58,7 +58,7 @@ NEAR_OPTIMUM = {"compiled": False, "hessian": "limited-memory"}
 class StairsEffort(Effort):
     """Effort of the reproduction."""
 
-    runs: int = 5  # of the colony on each reading of the tracked step, at most as many as readings.csv says
+    runs: int = 11  # of the colony on each reading of the tracked step, at most as many as readings.csv says
     evaluations: int = ANTS * ITERATIONS  # of a run, as in the paper
     starts: int = 1  # of IPOPT on each plan, the first one near our best known plan
     poses: int = 350  # of the network, every 0.01 s

@@ -369,8 +369,8 @@ REPRODUCTION = Paper(
     choices={name: row["choice"] for name, row in READINGS.items() if row["choice"]},
     compute=compute,
     headlines=(
-        *("f1-last", "optimal", "ranks-3", "short-steps", "margin", "static"),
-        *("speed", "speed-order", "f1-over-time", "accuracy"),
+        *("f1-last", "optimal", "ranks-3", "short-steps", "margin"),
+        *("speed", "speed-order", "accuracy", "accuracy-corrected"),
     ),
     show=show,
 )
