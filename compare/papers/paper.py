@@ -16,7 +16,8 @@ cannot be tested, and printed tables. The effect of a difference is a text in it
 
 The literal reading decides, or the next one if the print excludes it. Another reading that differs in a choice which the paper
 does not print, see ``Paper.choices``, makes a result that it changes depend on that choice. The page shows the citation, three
-sentences, the headlines and what ``show`` returns; notes, claims and differences are folded.
+sentences, the picture with which ``show`` begins, the headlines and what else it returns; notes, claims and differences are
+folded.
 """
 
 from __future__ import annotations
@@ -234,7 +235,7 @@ class Paper(Generic[E, R]):
         return compare_alternatives(choice, {literal: first, **others})
 
     def conclude(self, overall: Mapping[str, Judgement]) -> list[str]:
-        """Return up to three sentences: which headlines hold, which do not, and which are open, grouped by what they depend on."""
+        """Return up to three sentences: which headlines hold, which do not, and which are open, by what they depend on."""
         holding, failing, open_by_cause = list[str](), list[str](), dict[str, list[str]]()
         for id in self.headlines:
             claim, one = self.book.claims[id].claim, overall[id]
@@ -267,7 +268,9 @@ class Paper(Generic[E, R]):
             folded.append(Section(title="What is not as printed", parts=parts, folded=True))
         if effort.runs:
             folded.append(Section(title="Runs", parts=(tabulate_runs(runner.records),), folded=True))
-        return [self._tabulate_headlines(decided.overall), *self.show(results), *folded]
+        shown = list(self.show(results))
+        picture = [shown.pop(0)] if shown and isinstance(shown[0], Figure) else []
+        return [*picture, self._tabulate_headlines(decided.overall), *shown, *folded]
 
     def _tabulate_headlines(self, overall: Mapping[str, Judgement]) -> Table:
         rows = []

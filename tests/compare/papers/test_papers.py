@@ -62,8 +62,12 @@ def test_a_quick_run_confirms_the_record(name: str, quick: Quick) -> None:
 @pytest.mark.parametrize("name", REPRODUCTIONS)
 def test_the_page_begins_with_at_most_ten_lines(name: str) -> None:
     record = json.loads((RECORDS / f"{name}.json").read_text(encoding="utf-8"))
-    first = record["parts"][0]
-    assert first["columns"] == ["claim", "printed", "here", "result"] and len(first["rows"]) <= 10
+    picture, first = record["parts"][:2]
+    assert (
+        picture["figure"] == "gait"
+        and first["columns"] == ["claim", "printed", "here", "result"]
+        and len(first["rows"]) <= 10
+    )
     assert first["rows"][0][0] in paper_page(name)
     assert 0 < len(record["sentences"]) <= 3 and {*record["results"]} == {*record["verdicts"]}
 
