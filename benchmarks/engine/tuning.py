@@ -11,7 +11,7 @@ import nlp_gait
 from benchmarks.engine.markdown import cells, header
 from compare.questions.question import Work, find
 from compare.questions.sweep import Axis
-from compare.questions.tune import ScoredGait, Tune
+from compare.questions.tune import Tune, TunedGait
 from compare.study.memo import Memo
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import Bumps
@@ -44,13 +44,13 @@ def _tabulate(settings: Iterable[str], runs: int, simulations: int) -> Iterator[
         effort = {"runs": runs, "simulations": simulations, "limits": LIMITS}
         question = Tune(problem=nlp_gait.load("nao-cycle"), drive=drive, conditions=conditions, **effort)
         rows = find(question, Work(memo=Memo(FOLDER / setting.replace(" ", "-"))))
-        for solver in dict.fromkeys(row.found.solver for row in rows):
-            yield cells(setting, solver, *_summarise([row for row in rows if row.found.solver == solver]))
+        for solver in dict.fromkeys(row.solver for row in rows):
+            yield cells(setting, solver, *_summarise([row for row in rows if row.solver == solver]))
 
 
-def _summarise(rows: list[ScoredGait]) -> Iterator[str]:
+def _summarise(rows: list[TunedGait]) -> Iterator[str]:
     scores = [score for row in rows for score in (row.here, *row.elsewhere)]
-    yield f"{rows[0].found.simulations}"
+    yield f"{rows[0].simulations}"
     yield f"{np.median([row.here.J_per_m for row in rows]):.2f}"
     yield f"{np.median([row.elsewhere_J_per_m for row in rows]):.2f}"
     yield f"{np.median([row.model_J_per_m for row in rows]):.2f}"

@@ -1,24 +1,23 @@
 """What is a search worth where the simulator scores? IPOPT's gaits of the model beside searches in the engine."""
 
 import itertools
-import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from compare.drawing.charts import Chart, Series, draw_chart
-from compare.questions.question import Answer, Question, Work, make_record_table
+from compare.questions.question import Answer, Question, Work, make_record_table, make_table
 from compare.questions.sweep import Axis
-from compare.report.document import Figure, make_text_table
+from compare.report.document import Figure
 from metaheuristics import make_algorithm, minimize
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation import Array
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import Bumps
 from nlp_gait.simulation.objective import Arena, EngineObjective, GaitScore
@@ -27,38 +26,29 @@ from nlp_gait.simulation.simulate import Conditions
 GENERATIONS, LEAST_POPULATION = 10, 4  # a population may be smaller than usual, so that so many generations fit
 HELD_OUT = (1001, 1002, 1003)  # seeds of floors on which no gait is tuned
 HELD_OUT_M = 0.001  # height of their bumps, for gaits that are tuned on a calm floor
-HEADER = (
-    *("gait", "simulations", "J/m", "held-out J/m", "falls", "model J/m", "off the way", "slip mm"),
-    "model's rows violated",
+MODEL, TUNED, CONTINUED = "IPOPT", "IPOPT+limits", "IPOPT+CMA"
+CAPTION = (
+    f"After {{}} in the engine; held out: three other floors. {MODEL}: the optimum of the model; {TUNED}: with limits tuned in "
+    f"the engine; {CONTINUED}: CMA from the optimum"
 )
-REPEATED = {"torque": 1e-3, "velocity": 0.02, "none": 0.02}  # relative difference of a repeated score, by feed-forward
-MODEL, TUNED, CONTINUED = "IPOPT, the model's optimum", "IPOPT, limits tuned in the engine", "CMA from IPOPT's optimum"
+CURVES = "Least energy of a gait that does what it may, over simulations, by the score of the search"
 
 
 @dataclass(frozen=True, kw_only=True)
 class TunedGait:
-    """The best gait of one row, before it is judged."""
+    """The best gait of one row."""
 
     solver: str
     x: tuple[float, ...]
     simulations: int
-    J_per_m: float  #: score of the search
-    violation: float
+    score: GaitScore  #: of the search
     #: Simulations and the least energy so far of a gait that does what it may
-    history: tuple[tuple[int, float], ...] = ()
-    values: Mapping[str, float] = field(default_factory=dict)  #: tuned limits
-
-
-@dataclass(frozen=True, kw_only=True)
-class ScoredGait:
-    """A gait after ten steps, on the floor of the search and on others."""
-
-    found: TunedGait
+    history: tuple[tuple[int, float], ...]
+    limits: Mapping[str, float]  #: as they are tuned
     model_J_per_m: float
     rows_violated: int  #: of the model
-    here: GaitScore
-    elsewhere: tuple[GaitScore, ...]
-    repeats: bool  #: whether the score of the search is found again
+    here: GaitScore  #: after more steps, on the floor of the search
+    elsewhere: tuple[GaitScore, ...]  #: on others
 
     @property
     def elsewhere_J_per_m(self) -> float:
@@ -66,8 +56,21 @@ class ScoredGait:
         return float(np.mean([score.J_per_m for score in self.elsewhere]))
 
 
+COLUMNS: Mapping[str, Callable[[TunedGait], str]] = {
+    "gait": lambda row: row.solver,
+    "simulations": lambda row: f"{row.simulations}",
+    "J/m": lambda row: (
+        f"{row.here.J_per_m:.2f}" if row.here.fell_at_s is None else f"falls at {row.here.fell_at_s:.1f} s"
+    ),
+    "held-out J/m": lambda row: f"{row.elsewhere_J_per_m:.2f}",
+    "falls": lambda row: f"{sum(s.fell_at_s is not None for s in (row.here, *row.elsewhere))} of {1 + len(HELD_OUT)}",
+    "model J/m": lambda row: f"{row.model_J_per_m:.2f}",
+    "model's rows violated": lambda row: f"{row.rows_violated}",
+}
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Tune(Question[list[ScoredGait]]):
+class Tune(Question[list[TunedGait]]):
     """Which gait needs least energy in the engine, by model and IPOPT or by searches with as many simulations?"""
 
     name: ClassVar[str] = "tune"
@@ -87,167 +90,129 @@ class Tune(Question[list[ScoredGait]]):
     @property
     def total(self) -> int:
         """Rows, and the solves of tuned limits."""
-        return 2 + len(self._grid) + len(self._searches)
+        return 2 + len(self._grid) + len(self.algorithms) * self.runs
 
     @property
-    def _searches(self) -> list[tuple[str, int]]:
-        return [(name, self.seed + run) for name in self.algorithms for run in range(self.runs)]
+    def _grid(self) -> list[dict[str, float]]:
+        values = itertools.product(*(axis.values for axis in self.limits)) if self.limits else ()
+        return [dict(zip([axis.name for axis in self.limits], point, strict=True)) for point in values]
 
     @cached_property
-    def _arena(self) -> Arena:
-        return Arena(self.problem, drive=self.drive, conditions=self.conditions, steps=self.steps)
-
-    @cached_property
-    def _judges(self) -> list[Arena]:
+    def _arenas(self) -> list[Arena]:
+        """The world of the search; then, for more steps, the same and those of the held-out floors."""
         bumps = self.conditions.bumps or Bumps(height_m=HELD_OUT_M)
         floors = [replace(self.conditions, bumps=replace(bumps, seed=seed)) for seed in HELD_OUT]
         steps = None if self.steps is None else self.judged_steps
-        worlds = [self.conditions, *floors]
-        return [Arena(self.problem, drive=self.drive, conditions=c, steps=steps, settle_s=1.0) for c in worlds]
+        make = partial(Arena, self.problem, drive=self.drive)
+        judges = [make(conditions=world, steps=steps, settle_s=1.0) for world in (self.conditions, *floors)]
+        return [make(conditions=self.conditions, steps=self.steps), *judges]
 
-    def find(self, work: Work) -> Iterator[list[ScoredGait]]:
+    def find(self, work: Work) -> Iterator[list[TunedGait]]:
         """Yield the rows found so far; raises InputError for a problem that is no walk or cycle."""
         if "energy_J_per_m" not in build_exact_model(self.problem).index_names:
             raise InputError(
                 f"{self.problem.name} has no energy per metre; tune a walking cycle or a whole walk: nao-cycle"
             )
-        inputs = {**identify_problem(self.problem), "steps": self.steps, "starts": self.starts}
+        inputs = {**identify_problem(self.problem), "steps": (self.steps, self.judged_steps), "starts": self.starts}
         inputs |= {"drive": asdict(self.drive), "conditions": asdict(self.conditions)}
 
-        def compute(solver: str, more: Mapping[str, object], function: partial[TunedGait]) -> TunedGait:
+        def compute(solver: str, tune: Callable[..., TunedGait], **effort: Any) -> TunedGait:
             work.progress(solver)
-            return work.compute(TunedGait, "tune", {**inputs, "solver": solver, **more}, function)
+            call = partial(tune, solver, **effort)
+            return work.compute(TunedGait, "tune", {**inputs, "solver": solver, **effort}, call)
 
-        optimum = compute(MODEL, {}, partial(self._solve, self.problem, {}))
-        rows = [self._judge(optimum)]
+        optimum = compute(MODEL, self._solve, seed=self.seed, limits={})
+        rows = [optimum]
         yield rows
-        x = np.array(optimum.x)
-        grid = [dict(zip([axis.name for axis in self.limits], values, strict=True)) for values in self._grid]
-        tuned = [compute(TUNED, v, partial(self._solve, self.problem.with_values(**v), v)) for v in grid]
+        tuned = [compute(TUNED, self._solve, seed=self.seed, limits=limits) for limits in self._grid]
         if tuned:
-            best = min(tuned, key=lambda found: (found.violation, found.J_per_m))
-            rows.append(self._judge(replace(best, solver=TUNED, simulations=len(tuned))))
+            best = min(tuned, key=lambda row: (row.score.violation, row.score.J_per_m))
+            rows.append(replace(best, simulations=len(tuned)))
             yield rows
-        for solver, name, seed, first in [
-            (CONTINUED, "cma", self.seed, x),
-            *((name.upper(), name, seed, None) for name, seed in self._searches),
-        ]:
-            effort = {"seed": seed, "simulations": self.simulations}
-            rows.append(self._judge(compute(solver, effort, partial(self._search, solver, name, seed, first))))
+        effort = {"simulations": self.simulations, "seed": self.seed}
+        rows.append(compute(CONTINUED, self._search, name="cma", first=optimum.x, **effort))
+        yield rows
+        for name, run in itertools.product(self.algorithms, range(self.runs)):
+            effort["seed"] = self.seed + run
+            rows.append(compute(name.upper(), self._search, name=name, first=None, **effort))
             yield rows
 
-    @property
-    def _grid(self) -> list[tuple[float, ...]]:
-        return list(itertools.product(*(axis.values for axis in self.limits))) if self.limits else []
+    def _solve(self, solver: str, *, seed: int, limits: Mapping[str, float]) -> TunedGait:
+        solution = solve(self.problem.with_values(**limits), starts=self.starts, seed=seed, workers=1)
+        return self._judge(solver, np.array(solution.best.x), limits=limits)
 
-    def _solve(self, problem: GaitProblem, values: Mapping[str, float]) -> TunedGait:
-        solution = solve(problem, starts=self.starts, seed=self.seed, workers=1)
-        score = self._arena.score(np.array(solution.best.x))
-        return TunedGait(
-            solver=MODEL,
-            x=tuple(solution.best.x.tolist()),
-            simulations=1,
-            J_per_m=score.J_per_m,
-            violation=score.violation,
-            values=values,
-        )
-
-    def _search(self, solver: str, name: str, seed: int, first: Array | None) -> TunedGait:
-        objective = EngineObjective([self._arena])
-        population = min(make_algorithm(name).population, max(LEAST_POPULATION, self.simulations // GENERATIONS))
+    def _search(
+        self, solver: str, *, name: str, first: Sequence[float] | None, simulations: int, seed: int
+    ) -> TunedGait:
+        objective = EngineObjective(self._arenas[:1])
+        population = min(make_algorithm(name).population, max(LEAST_POPULATION, simulations // GENERATIONS))
         algorithm = make_algorithm(name, population=population)
         initial = None if first is None else np.clip(first, objective.lower, objective.upper)[None]
-        result = minimize(objective, algorithm, evaluations=self.simulations, seed=seed, initial=initial)
+        result = minimize(objective, algorithm, evaluations=simulations, seed=seed, initial=initial)
         h = result.history
-        feasible = [
-            (int(n), float(f)) for n, f, v in zip(h.evaluations, h.objective, h.violation, strict=True) if v == 0.0
-        ]
+        found = zip(h.evaluations.tolist(), h.objective.tolist(), h.violation.tolist(), strict=True)
+        return self._judge(solver, result.x, result.evaluations, [(n, f) for n, f, excess in found if excess == 0.0])
+
+    def _judge(
+        self,
+        solver: str,
+        x: Array,
+        simulations: int = 1,
+        history: Sequence[tuple[int, float]] = (),
+        limits: Mapping[str, float] | None = None,
+    ) -> TunedGait:
+        model = build_exact_model(self.problem)
+        values = model.at(x, self.problem.p)
+        score, here, *elsewhere = [arena.score(x) for arena in self._arenas]
+        end = [(simulations, score.J_per_m)] if score.violation == 0.0 else []
         return TunedGait(
             solver=solver,
-            x=tuple(result.x.tolist()),
-            simulations=int(result.evaluations),
-            J_per_m=float(result.objective),
-            violation=float(result.violation),
-            history=tuple(feasible),
-        )
-
-    def _judge(self, found: TunedGait) -> ScoredGait:
-        x, model = np.array(found.x), build_exact_model(self.problem)
-        values, again = model.at(x, self.problem.p), self._arena.score(x)
-        here, *elsewhere = [arena.score(x) for arena in self._judges]
-        return ScoredGait(
-            found=found,
+            x=tuple(x.tolist()),
+            simulations=simulations,
+            score=score,
+            history=(*history, *end),
+            limits=limits or {},
             model_J_per_m=values.indexes["energy_J_per_m"],
             rows_violated=len(model.find_violated(values)),
             here=here,
             elsewhere=tuple(elsewhere),
-            repeats=math.isclose(again.J_per_m, found.J_per_m, rel_tol=REPEATED[self.drive.feed_forward]),
         )
 
-    def report(self, findings: list[ScoredGait]) -> Answer:
+    def report(self, findings: list[TunedGait]) -> Answer:
         """Return the table of all rows, best energies over simulations, and a sentence for each search."""
         length = "a whole walk" if self.steps is None else f"{self.judged_steps} steps"
-        caption = f"After {length} in the engine; held out: three other floors"
-        table = make_text_table(HEADER, [_make_cells(row) for row in findings], caption)
-        lines = [series for row in findings for series in _list_progress(row)]
+        lines = [
+            Series(name=row.solver, x=n, y=energy, shape="step" if len(n) > 1 else "points")
+            for row, (n, energy) in ((row, np.array(row.history).T) for row in findings if row.history)
+        ]
         chart = Chart(x="simulations", y="energy in the engine [J/m]", series=lines, log=(True, True))
-        caption = "Least energy of a gait that does what it may, over simulations, by the score of the search"
-        differing = [row.found.solver for row in findings if not row.repeats]
-        notes = [f"Scores that were not found again when simulated here: {', '.join(differing)}."] if differing else []
         return Answer(
             title=f"{self.problem.title}: tuned in the engine",
-            headline=(*_compare_energies(findings), *notes),
+            headline=tuple(_compare_energies(findings)),
             parts=(
-                table,
-                Figure(name="tune", caption=caption, drawing=[draw_chart(chart)]),
+                make_table(CAPTION.format(length), findings, COLUMNS),
+                Figure(name="tune", caption=CURVES, drawing=[draw_chart(chart)]),
                 make_record_table("tune-rows", findings),
             ),
             stem="tune",
             data={"schema": 1, "rows": [asdict(row) for row in findings]},
-            results={},
         )
 
 
-def _list_progress(row: ScoredGait) -> Iterator[Series]:
-    found = row.found
-    if found.history:
-        n, energy = np.array([*found.history, (found.simulations, found.history[-1][1])]).T
-        yield Series(name=found.solver, x=n, y=energy, shape="step")
-    elif found.violation == 0.0:
-        yield Series(name=found.solver, x=np.array([found.simulations]), y=np.array([found.J_per_m]), shape="points")
-
-
-def _make_cells(row: ScoredGait) -> tuple[str, ...]:
-    here, scores = row.here, (row.here, *row.elsewhere)
-    limits = "".join(f", {name} = {value:.4g}" for name, value in row.found.values.items())
-    return (
-        row.found.solver + limits,
-        f"{row.found.simulations}",
-        f"{here.J_per_m:.2f}" if here.fell_at_s is None else f"falls at {here.fell_at_s:.1f} s",
-        f"{row.elsewhere_J_per_m:.2f}",
-        f"{sum(score.fell_at_s is not None for score in scores)} of {len(scores)}",
-        f"{row.model_J_per_m:.2f}",
-        f"{here.off:.1%}",
-        f"{1e3 * here.slip_m:.1f}",
-        f"{row.rows_violated}",
-    )
-
-
-def _compare_energies(findings: Sequence[ScoredGait]) -> Iterator[str]:
+def _compare_energies(findings: Sequence[TunedGait]) -> Iterator[str]:
     """Yield a sentence for IPOPT's gait, and for each other solver its median energy as a multiple of it."""
     first = findings[0].here
     if first.fell_at_s is not None:
         yield f"IPOPT's optimum of the model falls at {first.fell_at_s:.1f} s."
     else:
         yield f"IPOPT's optimum of the model needs {first.J_per_m:.2f} J/m in the engine, after one simulation."
-    for solver in dict.fromkeys(row.found.solver for row in findings[1:]):
-        rows = [row for row in findings if row.found.solver == solver]
+    for solver in dict.fromkeys(row.solver for row in findings[1:]):
+        rows = [row for row in findings if row.solver == solver]
         standing = [row.here.J_per_m for row in rows if row.here.fell_at_s is None]
-        after = f"After {rows[0].found.simulations} simulations"
-        fallen = f"; {len(rows) - len(standing)} of {len(rows)} fall" if len(standing) < len(rows) else ""
-        if not standing:
-            yield f"{after} every gait of {solver} falls."
-        else:
-            ratio = float(np.median(standing)) / first.J_per_m
-            of_median = "the median gait" if len(rows) > 1 else "the gait"
-            yield f"{after} {of_median} of {solver} needs {ratio:.2f} times that energy{fallen}."
+        limits = ", ".join(f"{name} = {value:.4g}" for name, value in rows[0].limits.items())
+        words = f"{solver}, {rows[0].simulations} simulations{f' ({limits})' if limits else ''}: "
+        if standing:
+            words += (
+                f"{np.median(standing) / first.J_per_m:.2f} times that energy{' (median)' if len(rows) > 1 else ''}; "
+            )
+        yield f"{words}{len(rows) - len(standing)} of {len(rows)} fall."

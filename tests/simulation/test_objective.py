@@ -16,7 +16,7 @@ from nlp_gait.formulation import Result
 pytest.importorskip("mujoco")
 pytestmark = pytest.mark.slow  # each gait is simulated
 
-from compare.questions.tune import Tune  # noqa: E402
+from compare.questions.tune import CONTINUED, MODEL, TUNED, Tune  # noqa: E402
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import measure_walk  # noqa: E402
 from nlp_gait.simulation.objective import Arena, EngineObjective  # noqa: E402
@@ -63,7 +63,8 @@ def test_rows_are_judged_on_other_floors_and_found_again(cycle: Result, tmp_path
     effort = {"simulations": 4, "runs": 1, "algorithms": ("random",), "starts": 1, "steps": 1, "judged_steps": 1}
     question = Tune(problem=cycle.problem, limits=limits, **effort)
     rows = find(question, Work(memo=Memo(tmp_path)))
-    assert [row.found.simulations for row in rows] == [1, 1, 4, 4] and all(row.repeats for row in rows)
+    assert [row.simulations for row in rows] == [1, 1, 4, 4]
+    assert [row.solver for row in rows] == [MODEL, TUNED, CONTINUED, "RANDOM"]
     model, tuned, *_ = rows
     assert model.here.fell_at_s is None and len(model.elsewhere) == 3
     assert model.rows_violated == 0 < tuned.rows_violated  # a smaller margin than the problem's
