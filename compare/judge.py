@@ -6,14 +6,18 @@ For rows that are functions of time, it is also proven which are satisfied at ev
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 from nlp_gait.backends.exact import build_exact_model, find_violated_rows
-from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.files import read_json
+from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 from nlp_gait.proofs.guarantee import Guarantee, guarantee
 from nlp_gait.proofs.time_search import MEAN_SHARPNESS
 
+SLIGHT = 1e-3  # violation, as a share of a row's scale, and error of an objective that printed digits explain
+SHOWN = 3  # violated rows
 DENSE_INTERVALS = 1000  # least number of intervals of the dense grid
 
 
@@ -87,3 +91,24 @@ def evaluate(
         if prove and values.violation <= FEASIBILITY_TOLERANCE
         else None,
     )
+
+
+def find_faults(result: Result, path: Path) -> list[str]:
+    """Return in words what is wrong with a gait from a file: rows and bounds that it violates, an objective that it has not."""
+    problem, stated = result.problem, read_json(path, "result").get("objective")
+    model = build_exact_model(problem)
+    values, scales = model.at(result.x, problem.p), dict(zip(model.row_names, model.row_scales.tolist(), strict=True))
+    rows = [row for row in model.find_violated(values) if not row.violation <= SLIGHT * scales[row.name]]
+    of_variables = model.row_names[-len(problem.names) :]
+    worst = [
+        f"{row.name} = {row.value:.4g} {row.unit}".removesuffix(" 1") + ", outside of its bounds "
+        f"{'-inf' if row.lower is None else f'{row.lower:.4g}'} to {'inf' if row.upper is None else f'{row.upper:.4g}'}"
+        for row in sorted(rows, key=lambda row: row.name not in of_variables)[:SHOWN]
+    ]
+    more = f"; and {len(rows) - SHOWN} more" if len(rows) > SHOWN else ""
+    sentences = [f"The gait is not feasible; violated: {'; '.join(worst)}{more}"] if rows else []
+    value = problem.objective.sign * values.cost
+    if isinstance(stated, int | float) and not abs(stated - value) <= SLIGHT * abs(value):
+        unit = problem.objective.unit
+        sentences.append(f"The file says {problem.objective.name} {stated:.6g} {unit}, and it is {value:.6g} {unit}")
+    return sentences

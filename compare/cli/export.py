@@ -8,8 +8,9 @@ from typing import Annotated
 from typer import Argument, Option
 
 from compare.cli.command import FORCE, OUTPUT, command, report_interrupts
-from compare.cli.options import Code, Limits, ProblemOptions, Values, judge_gait, name_all
+from compare.cli.options import Code, Limits, ProblemOptions, Values, name_all
 from compare.cli.printing import Output
+from compare.judge import find_faults
 from compare.study.record import load_result_or_record
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError, unknown
@@ -54,7 +55,7 @@ def export(
     ending, write = GAITS[to]
     result, path = load_result_or_record(Path(source)), Path(source)
     target = check_output(out or path.with_name(path.stem + ending), force)
-    faults = judge_gait(result, path)
+    faults = find_faults(result, path)
     with report_interrupts():
         write(target, result, period_ms)
     return Output(data={"source": source, "kind": to, "faults": faults}, parts=faults, written=[target])

@@ -13,9 +13,7 @@ from typer import Argument, Option
 from compare.cli.command import OUTPUT
 from compare.study.record import load_result_or_record
 from compare.study.run import ProblemSpec
-from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError, describe_type, unknown
-from nlp_gait.files import read_json
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.user_code import allow_code, is_reference
@@ -34,8 +32,6 @@ ProblemName = Annotated[str, Argument(metavar="PROBLEM")]
 Robot = str | None
 Values = Annotated[list[str] | None, Option("--set", metavar="NAME=VALUE")]
 Limits = Annotated[list[str] | None, Option("--limit", metavar="NAME")]
-SLIGHT = 1e-3  # violation, as a share of a row's scale, and error of an objective that printed digits explain
-SHOWN = 3  # violated rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,27 +45,6 @@ class StoredGait:
         """Return the gait; raises as ``load_result_or_record``, and InputError for code that is not a reference."""
         name_all(self.code)
         return load_result_or_record(self.result)
-
-
-def judge_gait(result: Result, path: Path) -> list[str]:
-    """Return in words what is wrong with a gait from a file: rows and bounds that it violates, an objective that it has not."""
-    problem, stated = result.problem, read_json(path, "result").get("objective")
-    model = build_exact_model(problem)
-    values, scales = model.at(result.x, problem.p), dict(zip(model.row_names, model.row_scales.tolist(), strict=True))
-    rows = [row for row in model.find_violated(values) if not row.violation <= SLIGHT * scales[row.name]]
-    of_variables = model.row_names[-len(problem.names) :]
-    worst = [
-        f"{row.name} = {row.value:.4g} {row.unit}".removesuffix(" 1") + ", outside of its bounds "
-        f"{'-inf' if row.lower is None else f'{row.lower:.4g}'} to {'inf' if row.upper is None else f'{row.upper:.4g}'}"
-        for row in sorted(rows, key=lambda row: row.name not in of_variables)[:SHOWN]
-    ]
-    more = f"; and {len(rows) - SHOWN} more" if len(rows) > SHOWN else ""
-    sentences = [f"The gait is not feasible; violated: {'; '.join(worst)}{more}"] if rows else []
-    value = problem.objective.sign * values.cost
-    if isinstance(stated, int | float) and not abs(stated - value) <= SLIGHT * abs(value):
-        unit = problem.objective.unit
-        sentences.append(f"The file says {problem.objective.name} {stated:.6g} {unit}, and it is {value:.6g} {unit}")
-    return sentences
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,9 @@ from typer import Option
 
 from compare.analysis.units import format_millimetres, with_unit
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
-from compare.cli.options import StoredGait, judge_gait, parse_numbers
+from compare.cli.options import StoredGait, parse_numbers
 from compare.cli.printing import Output, Rows, show_progress
+from compare.judge import find_faults
 from nlp_gait.errors import InputError, MissingExtraError, OutputError
 from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
 from nlp_gait.simulation.video import Frame, check_frames, check_video_path, write_video
@@ -125,7 +126,7 @@ def simulate(
         result = stored.load()
         plan = make_plan(result, steps)
         drive = drive_options.make(plan)
-        faults = judge_gait(result, stored.result)
+        faults = find_faults(result, stored.result)
     if video is not None:
         check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
     simulation = SimulationRun(plan, conditions, drive, sole)
