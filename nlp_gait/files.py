@@ -1,22 +1,18 @@
-"""Data files: read strictly, written atomically and durably.
+"""Data files: read strictly, written atomically.
 
 Only regular files of valid UTF-8 are read. JSON must not repeat a key or contain numbers that exceed 64 bits or are not finite,
 or text that cannot be encoded. A file is written under another name, flushed to the disk and renamed; a link of its name is
-replaced, never followed. An operating system holds writes in memory for some seconds; the content of a file, its name and the
-name of its folder reach the disk independently. So its folder is flushed, too, and the file survives a power cut.
+replaced, never followed.
 """
 
 import csv
-import errno
 import io
 import json
 import math
 import os
-import re
 import secrets
 import stat
 import tempfile
-import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
@@ -29,29 +25,10 @@ LARGEST_FILE = 64 * 2**20  # bytes; a record has about 10 kB, a result with thou
 DEEPEST = 32  # levels of objects and lists; files of this package have six
 LARGEST_INTEGER = 2**63 - 1
 SHOWN = 60  # characters of a value in a message
-# Writing takes far less, so an older temporary file belongs to no running process.
-LEFTOVER_AGE_S = 60.0
 LOCK = ".lock"  # stays in its folder: removed, it could be locked twice
 LOCK_CHECKED_EVERY_S = 0.01
 WAIT_SILENTLY_S = 5.0
-TEMPORARY = re.compile(r"\.[0-9a-f]{16}\.tmp")
 FORMULA = tuple("=+-@")  # a spreadsheet computes a cell that begins with one of these
-# Errors of systems on which a folder cannot be opened or flushed.
-NOT_FOR_FOLDERS = (errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM, errno.EBADF, errno.EISDIR)
-
-
-def flush(path: Path) -> None:
-    """Wait until a file's content, or the names in a folder if it can be flushed, are on the disk; raises OSError."""
-    is_folder = path.is_dir()
-    try:
-        descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
-    except OSError as error:
-        if not (is_folder and error.errno in NOT_FOR_FOLDERS):
-            raise
 
 
 @contextmanager
@@ -75,11 +52,8 @@ def lock_folder(path: Path, name: str = LOCK) -> Iterator[None]:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder and its parents, durably; existing ones are left alone; raises OSError."""
-    for folder in reversed([path, *(parent for parent in path.parents if not parent.exists())]):
-        if not folder.exists():
-            folder.mkdir(exist_ok=True)
-            flush(folder.parent)
+    """Make a folder and its parents; existing ones are left alone; raises OSError."""
+    path.mkdir(parents=True, exist_ok=True)
 
 
 def make_file_name(name: str) -> str:
@@ -195,7 +169,7 @@ def check_output(path: Path, force: bool = False) -> Path:
 def replace_file(path: Path) -> Iterator[Path]:
     """Yield a new empty file next to ``path`` with a hidden name in ``.tmp``, which replaces it at the end; raises OutputError.
 
-    A power cut leaves either the complete new file or the old state.
+    A killed process leaves the old state, and perhaps the hidden file.
     """
     temporary = None
     try:
@@ -206,9 +180,9 @@ def replace_file(path: Path) -> Iterator[Path]:
             unused.touch(exist_ok=False)  # it is not an existing file or link of another user
             temporary = unused
             yield temporary
-            flush(temporary)
+            with temporary.open("rb+") as file:
+                os.fsync(file.fileno())
             temporary.replace(path)
-            flush(path.parent)
     finally:
         if temporary is not None:
             with suppress(OSError):
@@ -293,15 +267,3 @@ def make_writable_folder(path: Path) -> Path:
         make_folder(path)
         tempfile.TemporaryFile(dir=path).close()
     return path
-
-
-def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files of ``replace_file`` that a killed process left; files that may be in use stay."""
-    for path in folder.glob(".*.tmp"):
-        if not TEMPORARY.fullmatch(path.name):
-            continue  # of another program
-        try:
-            if abs(time.time() - path.stat().st_mtime) > LEFTOVER_AGE_S:  # also from the future: the clock was set back
-                path.unlink(missing_ok=True)
-        except OSError:
-            continue  # removed by another process

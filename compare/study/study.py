@@ -30,7 +30,7 @@ from compare.study.settings import StudySettings, parse_settings
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError, OutputError, WorkerError
-from nlp_gait.files import convert_errors, lock_folder, make_writable_folder, read_json, remove_leftovers, write_json
+from nlp_gait.files import convert_errors, lock_folder, make_writable_folder, read_json, write_json
 from nlp_gait.interrupts import Interrupted, count_interrupts, delay_interrupts
 from nlp_gait.processes import Job, has_fork, run_jobs
 
@@ -253,7 +253,7 @@ def _read_finished(study: Study, inputs: Sequence[Inputs]) -> dict[int, RunRecor
     names = [study.name_run(run, given) for run, given in zip(study.runs, inputs, strict=True)]
     paths = [study.folder / RECORDS / f"{name}.json" for name in names]
     for folder in {path.parent for path in paths}:
-        remove_leftovers(make_writable_folder(folder))
+        make_writable_folder(folder)
     list_runs(study.folder, names)
     return {index: _read_named(path) for index, path in enumerate(paths) if path.exists()}
 

@@ -1,26 +1,14 @@
-"""Full disks and power cuts: what is finished is whole and flushed, and one sentence says what could not be written."""
+"""Full disks: what is finished is whole, and one sentence says what could not be written."""
 
-import os
 import resource
 import sys
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 
 from compare.study.record import read_record
-from compare.study.run import ProblemSpec, Run, Stop
-from compare.study.study import RECORDS, Study, name_record, run_study
-from nlp_gait.export.formats import write_npz
-from nlp_gait.formulation import Signals
 from tests.compare.cli.calls import nlp_gait
 from tests.faults.processes import in_own_mounts
-
-Finished = Callable[[Path], None]
-WALK = ProblemSpec(name="walk12")
 
 
 @pytest.mark.slow
@@ -69,62 +57,3 @@ def test_what_was_computed_is_printed_though_it_cannot_be_written(
     assert last.startswith("nlp-gait: cannot write ") and "File too large" in last
     assert all("continuing without storing results" in line for line in kept) and len(kept) <= 1
     assert [path.name for path in tmp_path.iterdir() if path.suffix != ".csv" and path.name != "store"] == []
-
-
-def write_arrays(folder: Path, finished: Finished) -> None:
-    write_npz(folder / "points.npz", Signals(joints=("a",), arrays={"q": np.arange(20.0)[:, None]}, columns={}))
-    finished(folder / "points.npz")
-
-
-def run_a_study(folder: Path, finished: Finished) -> None:
-    runs = tuple(Run(problem=WALK, solver="random", number=k, stop=Stop(evaluations=100)) for k in range(2))
-    run_study(Study(runs=runs, folder=folder), lambda run: finished(folder / RECORDS / f"{name_record(run)}.json"))
-    finished(folder / "study.json")
-
-
-class Journal:
-    """Sees which files and folders below a folder are flushed, and refuses a rename of what may still be torn."""
-
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.folder = folder
-        self.flushed: dict[int, tuple[int, int]] = {}  # size and time of the last change, by inode
-        self.unsure: set[int] = set()  # folders with names that a power cut may lose
-        self.renames = 0
-        for name in ("fsync", "mkdir", "rename", "replace"):
-            monkeypatch.setattr(os, name, partial(getattr(self, name), getattr(os, name)))
-
-    def fsync(self, fsync: Callable[[int], None], descriptor: int) -> None:
-        fsync(descriptor)
-        state = os.fstat(descriptor)
-        self.unsure.discard(state.st_ino)
-        self.flushed[state.st_ino] = (state.st_size, state.st_mtime_ns)
-
-    def mkdir(self, mkdir: Callable[..., None], path: Path, *rest: Any, **named: Any) -> None:
-        mkdir(path, *rest, **named)
-        self._name(Path(path))
-
-    def rename(self, rename: Callable[..., None], source: Path, target: Path, **named: Any) -> None:
-        state = os.stat(source, dir_fd=named.get("src_dir_fd"))
-        if self.folder in Path(target).absolute().parents:
-            assert self.flushed.get(state.st_ino) == (state.st_size, state.st_mtime_ns), f"{target} may be torn"
-            self.renames += 1
-        rename(source, target, **named)
-        self._name(Path(target))
-
-    replace = rename
-
-    def _name(self, path: Path) -> None:
-        if self.folder in path.absolute().parents:
-            self.unsure.add(path.parent.stat().st_ino)
-
-    def finished(self, path: Path) -> None:
-        assert path.exists() and not self.unsure, f"{path} may be lost"
-
-
-@pytest.mark.parametrize("write", [write_arrays, run_a_study])
-def test_a_file_is_flushed_before_it_is_renamed_and_its_folder_after_that(
-    write: Callable[[Path, Finished], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    journal = Journal(tmp_path, monkeypatch)
-    write(tmp_path, journal.finished)
-    assert journal.renames > 0

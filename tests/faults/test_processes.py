@@ -1,25 +1,19 @@
 """Processes that are killed, work at the same time or cannot begin: files are whole, no run is lost, and nothing runs on."""
 
 import itertools
-import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 import time
-from dataclasses import dataclass, replace
-from multiprocessing.synchronize import Barrier
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import nlp_gait
-from compare.study.perform import make_failed
-from compare.study.run import ProblemSpec, Run, Stop, make_inputs
-from compare.study.settings import SolverSpec, StudySettings
-from compare.study.study import RECORDS, Study, name_record, read_records, run_study, write_command, write_records
-from metaheuristics import ParticleSwarm
-from metaheuristics.interface import Search, Start
+from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.study import Study, read_records, run_study
 from nlp_gait.backends.kernel import library_cache
 from tests.compare.cli import calls
 from tests.faults.processes import ROOT, fake_compiler, start, wait_for
@@ -31,37 +25,6 @@ STUDIES, RUNS = 3, 6
 
 def make_run(evaluations: int, number: int, label: str = "") -> Run:
     return Run(problem=WALK, solver="random", label=label, stop=Stop(evaluations=evaluations), number=number)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Dies(ParticleSwarm):
-    """Particle swarm that kills its process as long as a file exists."""
-
-    marker: str
-
-    def start(self, start: Start) -> Search:
-        if Path(self.marker).exists():
-            os.kill(os.getpid(), signal.SIGKILL)
-        return super().start(start)
-
-
-@pytest.mark.slow
-def test_a_worker_that_dies_costs_its_run_alone_which_can_be_repeated(tmp_path: Path) -> None:
-    """All others have the same bits with any number of workers."""
-    marker, folder = tmp_path / "dies", tmp_path / "study"
-    marker.touch()
-    runs = [replace(make_run(300, k), solver=ParticleSwarm()) for k in range(4)]
-    alone = run_study(Study(runs=tuple(runs)))
-    runs[1] = replace(runs[1], solver=Dies(marker=str(marker)))
-    dying = run_study(Study(runs=tuple(runs), folder=folder, jobs=2))
-    died = "failed: WorkerError: its process ended without a result, by signal SIGKILL"
-    assert [record.status == died for record in dying] == [False, True, False, False]
-    marker.unlink()
-    (folder / RECORDS / f"{name_record(dying[1])}.json").unlink()
-    again = run_study(Study(runs=tuple(runs), folder=folder, jobs=3))
-    for name in ("x", "history", "counts"):
-        assert [getattr(record, name) for record in again] == [getattr(record, name) for record in alone]
-    assert [again[k] == dying[k] for k in range(4)] == [True, False, True, True]
 
 
 def list_offspring(parent: int) -> dict[int, str]:
@@ -104,38 +67,6 @@ def test_workers_and_compilers_end_with_what_started_them(name: str, started: st
         os.kill(process.pid, getattr(signal, name))
         process.communicate(timeout=30)
     wait_for(lambda: not offspring.keys() & list_offspring(0).keys(), SECONDS)
-
-
-def write_study(folder: Path, study: int, barrier: Barrier) -> None:
-    """Write all records of a study, in step with the others, read those of this study back in between, and its command."""
-    runs = [make_run(50 + study, number, f"study {study}") for number in range(RUNS)]
-    records = [make_failed(run, inputs, "tried") for run, inputs in zip(runs, make_inputs(runs), strict=True)]
-    settings = StudySettings(problems=(WALK,), solvers=(SolverSpec(name="random"),))
-    for count in range(1, RUNS + 1):
-        barrier.wait(60)
-        write_records(records[:count], folder)
-        write_command(folder, settings, f"study {study}")
-        assert len(read_records(folder)[0]) >= count  # as for the report, while others write
-        barrier.wait(60)
-        found, damaged = read_records(folder)
-        assert len(found) == STUDIES * count and not damaged
-
-
-@pytest.mark.slow
-@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="processes cannot be copied here")
-def test_several_studies_in_one_folder_lose_nothing(tmp_path: Path) -> None:
-    make_inputs([make_run(50, 0)])  # built before the forks
-    context = multiprocessing.get_context("fork")
-    studies = [*range(STUDIES), 0]  # one of them twice
-    barrier = context.Barrier(len(studies))
-    jobs = [context.Process(target=write_study, args=(tmp_path, study, barrier)) for study in studies]
-    for job in jobs:
-        job.start()
-    for job in jobs:
-        job.join()
-    assert [job.exitcode for job in jobs] == [0] * len(jobs)
-    stored = sorted((record.inputs.stop["evaluations"], record.run) for record in read_records(tmp_path)[0])
-    assert stored == [(50 + study, number) for study in range(STUDIES) for number in range(RUNS)]
 
 
 @pytest.mark.slow

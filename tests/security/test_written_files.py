@@ -1,12 +1,10 @@
 """Files that are written: by this process alone, under their own name, through no link."""
 
 import csv
-import errno
 import io
 import os
 import stat
 from collections.abc import Callable
-from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +12,6 @@ import pytest
 from matplotlib.figure import Figure
 
 from compare.drawing.figures import save_figure
-from nlp_gait import files
 from nlp_gait.errors import OutputError
 from nlp_gait.export.formats import write_npz
 from nlp_gait.files import format_csv, replace_file, write_text
@@ -92,24 +89,3 @@ def test_no_cell_of_a_table_is_a_formula(sign: str) -> None:
         assert cell == f"'{text}" and other == "plain"
     numbers = ["-1.5", "+2", "-1e-300", "-inf", "-", "1", -1.5, True]
     assert format_csv([numbers]) == "-1.5,+2,-1e-300,-inf,-,1,-1.5,True\n"
-
-
-@pytest.mark.parametrize("number", [errno.EINVAL, errno.EPERM, errno.EIO])
-def test_only_folders_may_be_left_to_the_file_system(
-    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """EINVAL is what some network file systems answer to a folder's flush; EIO is a broken disk."""
-
-    def fail(descriptor: int) -> None:
-        opened.append(descriptor)
-        raise OSError(number, "no flush")
-
-    opened: list[int] = []
-    monkeypatch.setattr(files.os, "fsync", fail)
-    (tmp_path / "file").touch()
-    for path in (tmp_path / "file", tmp_path):
-        with pytest.raises(OSError, match="no flush") if path != tmp_path or number == errno.EIO else nullcontext():
-            files.flush(path)
-    for descriptor in opened:
-        with pytest.raises(OSError, match="Bad file descriptor"):
-            os.fstat(descriptor)

@@ -272,20 +272,3 @@ def test_bad_study_files_are_one_sentence(change: tuple[str, str], message: str,
     with pytest.raises(GaitError, match=message):
         for task in read_settings(path).make_runs():
             task.problem.load()
-
-
-def test_leftovers_of_a_killed_process_go(tmp_path: Path) -> None:
-    from nlp_gait.files import remove_leftovers
-
-    old, new, record = (tmp_path / name for name in (".0123456789abcdef.tmp", ".1123456789abcdef.tmp", "c.json"))
-    others = [".mywork.tmp", ".notes.tmp", ".0123456789abcdeF.tmp", ".0123456789abcdef0.tmp", "0123456789abcdef.tmp"]
-    for path in (old, new, record, *(tmp_path / name for name in others)):
-        path.write_text("")
-    long_ago = time.time() - 3600
-    for path in (old, *(tmp_path / name for name in others)):
-        os.utime(path, (long_ago, long_ago))
-    ahead = tmp_path / ".2123456789abcdef.tmp"  # the clock was set back
-    ahead.write_text("")
-    os.utime(ahead, (time.time() + 86_400.0,) * 2)
-    remove_leftovers(tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {new.name, record.name, *others}
