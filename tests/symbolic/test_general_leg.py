@@ -32,8 +32,10 @@ STEP_S, DIFFERENCE_TOLERANCE = 1e-4, 1e-5
 
 
 @cache
-def leg_function(robot: Robot, side: str) -> tuple[Leg, ca.Function]:
-    """From the hips' middle over the foot's origin with both derivatives, and roll and pitch likewise, to the leg's motion."""
+def leg_function(
+    robot: Robot, side: str, point_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> tuple[Leg, ca.Function]:
+    """From a point of the torso over the foot's origin with derivatives, and roll and pitch likewise, to the leg's motion."""
     leg = make_biped_model(robot).legs[side]
     place = Motion(*(SX.sym(name, 3) for name in ("p", "v", "a")))
     roll, pitch = (Motion(*(SX.sym(f"{angle}{k}") for k in range(3))) for angle in ("roll", "pitch"))
@@ -42,7 +44,7 @@ def leg_function(robot: Robot, side: str) -> tuple[Leg, ca.Function]:
     about, y = turn @ DM([1, 0, 0]), SX(DM([0, 1, 0]))
     spin = y * pitch.velocity + about * roll.velocity
     rate = y * pitch.acceleration + about * roll.acceleration + ca.cross(y, about) * pitch.velocity * roll.velocity
-    torso = TorsoMotion(rotation, spin, rate, np.zeros(3), place)
+    torso = TorsoMotion(rotation, spin, rate, np.array(point_m), place)
     found = leg_motion(leg, count_newton_steps(leg), torso, SX(0.01), Exact(), held=True)
     return leg, ca.Function("leg", [*place, *roll, *pitch], [*found.joints, found.miss, found.reach])
 
@@ -62,6 +64,21 @@ def pose(leg: Leg, k: int) -> tuple[Array, float, float]:
     rotation = column[3:].reshape(3, 3).T
     pitch, roll = float(np.arctan2(-rotation[2, 0], rotation[0, 0])), float(np.arctan2(-rotation[1, 2], rotation[1, 1]))
     return column[:3] - rotation @ leg.hip_m, roll, pitch
+
+
+def test_any_point_of_the_torso_may_be_given(robots: dict[str, Robot]) -> None:
+    """Here, at rest, one that is 0.3 m above the origin and beside it; the leg is the same."""
+    leg, by_origin = leg_function(robots["nao"], "left")
+    above = (0.02, -0.01, 0.3)
+    by_point = leg_function(robots["nao"], "left", above)[1]
+    origin, roll, pitch = pose(leg, 0)
+    turn = Rotation.from_euler("xy", [roll, pitch]).as_matrix()
+    rest = [np.zeros(3)] * 2
+    angles = [
+        function(place, *rest, roll, 0.0, 0.0, pitch, 0.0, 0.0)[0].full()
+        for function, place in ((by_origin, origin), (by_point, origin + turn @ above))
+    ]
+    assert angles[1] == pytest.approx(angles[0], abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["nao", "crooked"])

@@ -67,6 +67,17 @@ def tabulate_basis(spans: int) -> Array:
     return np.array([function(s).full()[:, 0] for s in np.linspace(0.0, 1.0, 40)])
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_starts_are_drawn_around_the_middle_of_the_bounds(name: str) -> None:
+    problem = load(name, trajectory="quintic")
+    shifted = problem.with_values(**{f"{problem.names[-1]}.lower": 0.0})
+    rng = np.random.default_rng(0)
+    starts = np.array([shifted.start_point(rng) for _ in range(200)])
+    assert ((starts >= shifted.lower) & (starts <= shifted.upper)).all()
+    span = shifted.upper - shifted.lower
+    assert (starts.mean(axis=0) - shifted.lower) / span == pytest.approx(np.full(len(span), 0.5), abs=0.1)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_each_order_contains_the_one_before(name: str) -> None:
