@@ -88,24 +88,21 @@ def sweep(
     over: Annotated[list[str], Option(metavar="NAME=LOW:HIGH:COUNT")],
     starts: options.Starts = 5,
     seed: options.Seed = 0,
-    engine: Annotated[bool, Option("--engine")] = False,
-    steps: Annotated[int, Option(min=1, max=1000)] = 10,
     problem: options.NamedProblem,
     out: options.OutFolder = options.RESULTS,
 ) -> Output:
     """Solve a problem over a grid of parameter values or fixed variables, each point from its neighbour.
 
-    With speeds as an axis the objective of a walking cycle is its power. Simulations are open loop.
+    With speeds as an axis the objective of a walking cycle is its power; each of its gaits is a file for `nlp-gait simulate`.
 
     Examples: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`,
-    `nlp-gait sweep nao-cycle --over speed_m_s=0.01:0.1:10 --engine`,
+    `nlp-gait sweep nao-cycle --over speed_m_s=0.01:0.1:10`,
     `nlp-gait sweep humanoid-cycle --robot my.urdf --set intervals=5 --over speed_m_s=0.1:0.6:6`
     """
     axes = [parse_axis(text) for text in over]
     if problem.name in CYCLES and any(axis.name == SPEED for axis in axes):
         problem = replace(problem, values=["objective=power", *(problem.values or ())])
-    effort = {"starts": starts, "seed": seed, "steps": steps if engine else 0}
-    return run_question(Sweep(problem=problem.load(), axes=axes, **effort), out)
+    return run_question(Sweep(problem=problem.load(), axes=axes, starts=starts, seed=seed), out)
 
 
 @command

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import ClassVar, cast
 
@@ -14,7 +14,7 @@ from matplotlib.figure import Figure as Drawing
 from compare.analysis.units import format_quantity, list_units, make_axis_label, with_unit
 from compare.drawing.figures import COLOURS, make_axes, use_style
 from compare.questions.question import Answer, Question, Work, make_record_table
-from compare.questions.swept_walks import COST, SweepPoint, check_cycle, mark_values, report_walks, simulate_walk
+from compare.questions.swept_walks import COST, SweepPoint, mark_values, report_walks
 from compare.report.document import Figure, make_text_table
 from compare.study.references import find_reference
 from compare.study.run import IPOPT, describe_problem
@@ -22,10 +22,9 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import GaitProblem, Result
+from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Solution
 from nlp_gait.interrupts import Interrupted
-from nlp_gait.simulation.engine import load_mujoco
 
 MOST_POINTS = 10_000  # of an axis, and of the whole grid
 
@@ -70,16 +69,13 @@ class Sweep(Question[list[SweepPoint]]):
     axes: Sequence[Axis]  #: at least one
     starts: int = 5  #: random starts at both ends of the path, and where no neighbour helps
     seed: int = 0  #: of the starts
-    steps: int = 0  #: of each walking cycle to simulate in the engine, open loop; 0 for none (extra ``sim``)
 
     def __post_init__(self) -> None:
         """Validate the grid.
 
         Raises:
             UnknownNameError: an axis is neither a variable nor a parameter.
-            InputError: a value is not allowed, an axis is duplicated, the grid has too many points, or the problem is not a
-                walking cycle whose steps can be simulated.
-            MissingExtraError: MuJoCo is needed and not installed.
+            InputError: a value is not allowed, an axis is duplicated, or the grid has too many points.
         """
         names = [axis.name for axis in self.axes]
         if len(set(names)) < len(names):
@@ -92,14 +88,11 @@ class Sweep(Question[list[SweepPoint]]):
             )
         for place in self._path:
             self.problem.place(place)
-        if self.steps:
-            check_cycle(self.problem)
-            load_mujoco()
 
     @property
     def total(self) -> int:
         # Two solves at each point of the grid.
-        return math.prod(len(axis.values) for axis in self.axes) * (2 + bool(self.steps))
+        return math.prod(len(axis.values) for axis in self.axes) * 2
 
     def find(self, work: Work) -> Iterator[list[SweepPoint]]:
         """Yield the points, in row-major order of the axes."""
@@ -122,13 +115,6 @@ class Sweep(Question[list[SweepPoint]]):
             yield grid
         if interrupt is not None:
             raise interrupt
-        for i, point in enumerate(grid if self.steps else ()):
-            if point.feasible:
-                placed = self.problem.place(point.at)
-                result = Result(problem=placed, x=placed.check_x(point.x))
-                grid[i] = replace(point, walk=simulate_walk(result, self.steps, work))
-                yield grid
-            work.progress("")
 
     @cached_property
     def _path(self) -> list[dict[str, float]]:
@@ -162,7 +148,7 @@ class Sweep(Question[list[SweepPoint]]):
                 make_text_table((*axes, objective.name, "status", "best known"), rows, "Optima"),
                 Figure(name=stem, caption=shown, drawing=plot_sweep(findings, problem)),
                 *report_walks(problem, findings),
-                make_record_table(stem, [point.to_row() for point in findings]),
+                make_record_table(stem, findings),
             ),
             data={"problem": problem.name, "points": [asdict(point) for point in findings]},
             results={

@@ -1,26 +1,19 @@
-"""Points of a sweep; of walking cycles among them the cost of transport, and their simulation in the engine."""
+"""Points of a sweep; of walking cycles among them the cost of transport."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import format_millimetres, list_units, make_axis_label, name_in_words, with_unit
+from compare.analysis.units import list_units, make_axis_label, name_in_words
 from compare.drawing.figures import make_figure, use_style
-from compare.questions.question import Work, make_table
+from compare.questions.question import make_table
 from compare.report.document import Figure, Part
-from nlp_gait.backends.identity import identify_problem
-from nlp_gait.errors import InputError
-from nlp_gait.formulation import GaitProblem, Result
-from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.measurements import Walk, measure_walk
-from nlp_gait.simulation.plan import make_plan
-from nlp_gait.simulation.simulate import simulate_plan
+from nlp_gait.formulation import GaitProblem
 
-MODEL, ENGINE, FALLS = "#000000", "#56B4E9", "#D55E00"
+MODEL = "#000000"
 PHASE_COLOURS = ("#0072B2", "#D55E00")
 COST = "cost_of_transport"  # index that only walking cycles have
 
@@ -38,34 +31,6 @@ class SweepPoint:
     evaluations: int  #: calls of f
     time_s: float  #: wall time [s]
     indexes: Mapping[str, float] = field(default_factory=dict)  #: exact performance indexes
-    walk: Walk | None = None  #: of the gait in the engine; None without a simulation
-
-    def to_row(self) -> dict[str, Any]:
-        """Return the cells of a table, with the main numbers of the simulation."""
-        row = {name: value for name, value in vars(self).items() if name != "walk"}
-        if self.walk is not None:
-            numbers = self.walk.measurements
-            power = {"mechanical_W": numbers.measured.mechanical_W, "heat_W": numbers.measured.heat_W}
-            row["engine"] = {**self.walk.course(), "largest_tilt_deg": numbers.largest_tilt_deg, **power}
-        return row
-
-
-def check_cycle(problem: GaitProblem) -> None:
-    """Raise InputError for a problem that is not a walking cycle."""
-    model = problem.display.simulation_model
-    if model is None or not model.repeats:
-        raise InputError(f"--engine simulates steps of walking cycles, such as nao-cycle; {problem.name!r} is not one")
-
-
-def simulate_walk(result: Result, steps: int, work: Work) -> Walk:
-    """Simulate so many steps of a gait in open loop; raises MissingExtraError without MuJoCo."""
-    inputs = {**identify_problem(result.problem), "x": result.x.tolist(), "steps": steps, "drive": repr(Drive())}
-    return work.compute(Walk, "walk", inputs, partial(_simulate_walk, result, steps))
-
-
-def _simulate_walk(result: Result, steps: int) -> Walk:
-    plan = make_plan(result, steps)
-    return measure_walk(plan, simulate_plan(plan), Drive(), steps)
 
 
 def report_walks(problem: GaitProblem, points: Sequence[SweepPoint]) -> list[Part]:
@@ -82,7 +47,6 @@ def report_walks(problem: GaitProblem, points: Sequence[SweepPoint]) -> list[Par
         **{_name_phase(time): partial(_format_duration, time) for time in problem.display.durations},
     }
     parts: list[Part] = [make_table("Cheapest cycles, with the durations of their phases", feasible, columns)]
-    parts += _report_simulations(", ".join(axes), feasible)
     if len(axes) == 1:
         caption = "Cost of transport, step and durations; crosses where no feasible cycle was found."
         parts.append(Figure(name=f"{problem.name}-cost", caption=caption, drawing=plot_costs(points, problem)))
@@ -102,42 +66,6 @@ def _name_phase(time: str) -> str:
     return name_in_words(time, "s").removesuffix(" time")
 
 
-def _report_simulations(axes: str, points: Sequence[SweepPoint]) -> list[Part]:
-    """Table of the simulated gaits, and how well they confirm the model."""
-    walks = [(_format_place(point), point.walk) for point in points if point.walk is not None]
-    if not walks:
-        return []
-    columns: Mapping[str, Callable[[tuple[str, Walk]], str]] = {
-        axes: lambda row: row[0],
-        "model": lambda row: with_unit(row[1].model_J_per_m, "J/m", ".2f"),
-        "engine": lambda row: with_unit(row[1].engine_J_per_planned_m, "J/m", ".2f"),
-        "error": lambda row: _format_error(row[1]),
-        "walked": lambda row: format_millimetres(row[1].walked_m, ".0f"),
-        "of": lambda row: format_millimetres(row[1].planned_m, ".0f"),
-        "drift": lambda row: format_millimetres(row[1].drift_m),
-        "end": lambda row: _describe_end(row[1]),
-    }
-    title = f"Energy of {walks[0][1].steps} steps in the engine, for each planned metre, and their course"
-    pairs = [(walk.model_J_per_m, walk.engine_J_per_planned_m) for _, walk in walks]
-    errors = [100.0 * abs(engine / model - 1.0) for model, engine in pairs if engine is not None]
-    text = f"{len(walks)} gaits were simulated, {len(walks) - len(errors)} fell."
-    if errors:
-        text += f" Error of the model: {sum(errors) / len(errors):.2f} % mean, {max(errors):.2f} % at most."
-    return [make_table(title, walks, columns), text]
-
-
-def _format_error(walk: Walk) -> str:
-    if walk.engine_J_per_planned_m is None:
-        return "-"
-    return f"{100.0 * (walk.engine_J_per_planned_m / walk.model_J_per_m - 1.0):+z.2f} %"
-
-
-def _describe_end(walk: Walk) -> str:
-    fell_at_s = walk.measurements.fell_at_s
-    end = "walks" if fell_at_s is None else f"falls at {fell_at_s:.2f} s"
-    return end if walk.steps_done == walk.steps else f"{end}, {walk.steps_done} steps"
-
-
 def plot_costs(points: Sequence[SweepPoint], problem: GaitProblem) -> Drawing:
     """Plot cost of transport, step length and durations along the only axis; infeasible points as crosses."""
     (name,) = points[0].at
@@ -146,17 +74,7 @@ def plot_costs(points: Sequence[SweepPoint], problem: GaitProblem) -> Drawing:
     with use_style():
         figure = make_figure(6.3, 5.0)
         cost, lengths, times = figure.subplots(3, 1, sharex=True, height_ratios=(2, 1, 1))
-        cost.plot(places, [point.indexes[COST] for point in good], "o-", color=MODEL, label="model")
-        walks = [(point, point.walk) for point in good if point.walk is not None]
-        covered = [  # energy over the distance that was really covered
-            (point.at[name], walk.engine_J_per_m / point.indexes["energy_J_per_m"] * point.indexes[COST])
-            for point, walk in walks
-            if walk.engine_J_per_m is not None
-        ]
-        if covered:
-            cost.plot(*zip(*covered, strict=True), "s--", color=ENGINE, label="engine")
-        fallen = [point.at[name] for point, walk in walks if walk.measurements.fallen]
-        mark_values(cost, fallen, "falls", "v", FALLS, 0.1)
+        cost.plot(places, [point.indexes[COST] for point in good], "o-", color=MODEL, label="optimum")
         mark_values(cost, [point.at[name] for point in points if not point.feasible], "infeasible")
         cost.set(ylabel="cost of transport\nP / (m g v)")
         cost.legend()
@@ -171,10 +89,7 @@ def plot_costs(points: Sequence[SweepPoint], problem: GaitProblem) -> Drawing:
     return figure
 
 
-def mark_values(
-    axes: Axes, values: Sequence[float], label: str, marker: str = "x", colour: str = "0.4", height: float = 0.03
-) -> None:
-    """Mark values of x at a share of the axes' height."""
+def mark_values(axes: Axes, values: Sequence[float], label: str) -> None:
+    """Mark values of x near the lower end of the axes."""
     if values:
-        transform = axes.get_xaxis_transform()
-        axes.plot(values, [height] * len(values), marker, color=colour, label=label, transform=transform)
+        axes.plot(values, [0.03] * len(values), "x", color="0.4", label=label, transform=axes.get_xaxis_transform())

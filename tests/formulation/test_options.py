@@ -1,7 +1,6 @@
 """A problem records its options, and loading it with them gives the same problem."""
 
 import inspect
-from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
@@ -10,8 +9,6 @@ import numpy as np
 import pytest
 
 from compare.judge import evaluate
-from compare.study.run import ProblemSpec, Run, make_inputs
-from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Grid, load
 from nlp_gait.formulation.registry import find_maker
@@ -75,10 +72,6 @@ def test_stairs_are_recorded(tmp_path: Path) -> None:
         load("humanoid-walk", robot=problem.options["robot"], **STAIRS, slope_deg=3.0)
 
 
-def make_task(name: str, options: Mapping[str, Any]) -> Run:
-    return Run(problem=ProblemSpec(name=name, options=options), solver="ipopt")
-
-
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=[pytest.mark.slow] if name.startswith("humanoid-") else []) for name in PROBLEMS],
@@ -94,29 +87,6 @@ def test_every_option_is_recorded(name: str) -> None:
         again = load(problem.name, **problem.options)
         assert again.options == problem.options
         assert (again.names, again.grid, again.parameters) == (problem.names, problem.grid, problem.parameters)
-
-
-# The cycle stands for the humanoid's other problems, which take the same bodies and phases.
-RELOADED = [name for name in PROBLEMS if name == "humanoid-cycle" or not name.startswith("humanoid-")]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", RELOADED)
-def test_recorded_options_make_the_same_problem(name: str) -> None:
-    """With no option at its default: grid, inputs of runs, rows, and every exact value at a point off the middle."""
-    asked = make_task(name, others(name))
-    problem = asked.problem.load()
-    recorded = make_task(problem.name, problem.options)
-    again = recorded.problem.load()
-    assert (again.options, again.grid) == (problem.options, problem.grid)
-    mine, same, default = make_inputs([asked, recorded, make_task(name, {})])
-    assert same == mine and mine.key != default.key
-    assert build_exact_model(again).row_names == build_exact_model(problem).row_names
-    x = problem.lower + 0.4 * (problem.upper - problem.lower)
-    here, there = evaluated(problem, x), evaluated(again, x)
-    for key in ("cost", "violation", "g", "lower", "upper"):
-        np.testing.assert_array_equal(getattr(there, key), getattr(here, key), err_msg=key)
-    np.testing.assert_equal(there.indexes, here.indexes)
 
 
 @pytest.mark.slow

@@ -1,7 +1,6 @@
 """User-defined problems by name; mistakes in them are reported when they are made, with the name of the row."""
 
 import json
-import pickle
 from dataclasses import replace
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
@@ -42,30 +41,6 @@ def test_a_maker_in_a_file_is_loaded_with_its_options_and_solved() -> None:
     assert solve(problem, starts=2).converged
     with pytest.raises(UnknownNameError, match="did you mean 'intervals'"):
         load(f"{EXAMPLE}:two_link", interval=10)
-
-
-def test_a_pickle_keeps_its_options() -> None:
-    problem = load(f"{EXAMPLE}:two_link", intervals=10, lift_m=1)  # a whole number for a length
-    again = pickle.loads(pickle.dumps(problem))
-    assert again.options == {"intervals": 10, "lift_m": 1} and again.names == problem.names
-    for wrong in (True, "0.05", float("nan")):
-        with pytest.raises(InputError, match="option lift_m must be a finite number, got"):
-            load(f"{EXAMPLE}:two_link", lift_m=wrong)
-
-
-def test_an_edited_file_and_another_folder_are_other_problems(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In one process; within one second and of one length, where a compiled copy would be taken for the same."""
-    text = "from nlp_gait.formulation import load\nleg = load('walk12').with_values(**{'lambda': 0.25})\n"
-    for folder, value in (("a", "0.25"), ("b", "0.75")):
-        (tmp_path / folder).mkdir()
-        (tmp_path / folder / "own.py").write_text(text.replace("0.25", value))
-    monkeypatch.chdir(tmp_path / "a")
-    spec = ProblemSpec(name="own.py:leg")
-    assert spec.load().value("lambda") == 0.25
-    Path("own.py").write_text(text.replace("0.25", "0.35"))
-    assert (load("own.py:leg").value("lambda"), spec.load().value("lambda")) == (0.35, 0.35)
-    monkeypatch.chdir(tmp_path / "b")
-    assert (load("own.py:leg").value("lambda"), spec.load().value("lambda")) == (0.75, 0.75)
 
 
 def test_a_robot_file_is_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -58,12 +58,6 @@ def test_solve_and_compare(tmp_path):
     assert len(list((out / "records" / "nao-ssp").glob("*.json"))) == 7
 
 
-def test_fixed_variable_and_parameter():
-    fixed = as_json("solve", "walk12", "--starts", "1", "--set", "foot_lift_m=0.015", "--set", "lambda=0.3")
-    assert fixed["x"]["foot_lift_m"] == pytest.approx(0.015, abs=1e-12)
-    assert fixed["parameters"]["lambda"] == 0.3
-
-
 def test_unreachable_pose_is_evaluated_and_named():
     x = PSO_OF_THE_PAPER.replace("0.31,", "0.36,", 1)
     result = as_json("evaluate", "nao-ssp", "--x", x)

@@ -1,4 +1,4 @@
-"""Sweeps of walking cycles: cost of transport, results that can be simulated, and the engine."""
+"""Sweeps of walking cycles: cost of transport, and results that can be simulated."""
 
 import csv
 from dataclasses import replace
@@ -12,15 +12,12 @@ from compare.questions.swept_walks import SweepPoint
 from compare.report.document import Figure
 from compare.study.memo import Memo
 from nlp_gait import load
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import load_result
-from tests.compare.cli.calls import as_json
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 # Fewer samples than those of ten intervals: the tests are about what is done with the gaits.
 OVER = "speed_m_s=0.04,0.045"
-COMMAND = ["sweep", "nao-cycle", "--over", OVER, "--starts", "1", "--set", "intervals=2"]
 
 
 @pytest.fixture(scope="module")
@@ -65,22 +62,3 @@ def test_the_table_and_the_results_can_be_read_back(question: Sweep, points: lis
         result = load_result(tmp_path / f"nao-cycle-speed_m_s-{speed:g}.json")
         assert result.problem.value("speed_m_s") == speed
         assert result.problem.by_name(result.x) == point.x
-
-
-def test_only_walking_cycles_are_simulated() -> None:
-    with pytest.raises(InputError, match="steps of walking cycles, such as nao-cycle; 'nao-ssp' is not one"):
-        Sweep(problem=load("nao-ssp"), axes=[parse_axis("swing_height_m=0.02")], steps=2)
-
-
-def test_the_command_simulates_stored_gaits(points: list[SweepPoint], folder: Path) -> None:
-    pytest.importorskip("mujoco")
-    found = as_json(*COMMAND, "--engine", "--steps", "2", "--out", folder)["points"]
-    assert [point["x"] for point in found] == [point.x for point in points[:2]]
-    for point in found:
-        assert point["walk"]["steps_done"] == 2 and not point["walk"]["measurements"]["fallen"]
-        assert point["walk"]["walked_m"] == pytest.approx(point["walk"]["planned_m"], rel=0.3)
-    assert (folder / "nao-cycle-cost.svg").exists()
-    page = (folder / "nao-cycle-sweep-speed_m_s-ipopt.md").read_text()
-    assert "Energy of 2 steps in the engine" in page and "2 gaits were simulated, 0 fell" in page
-    error = found[0]["walk"]["engine_J_per_planned_m"] / found[0]["walk"]["model_J_per_m"] - 1.0
-    assert f"{100 * error:+.2f} %" in page

@@ -69,20 +69,6 @@ def find_key(run: Run) -> str:
     return inputs.key
 
 
-def test_an_edited_file_or_helper_is_another_input_and_a_moved_one_is_the_same(tmp_path: Path) -> None:
-    (run,) = replace(STUDY, solvers=(PSO,), runs=1).make_runs()
-    home, elsewhere = tmp_path / "home", tmp_path / "elsewhere"
-    home.mkdir()
-    (home / "mine.py").write_text("import sizes\ndef search(f, lower, upper, evaluations, seed): f(lower[None])\n")
-    keys = {find_key(run), find_key(replace(run, polish=True))}
-    for text in ("N = 1", "N = 2"):
-        (home / "sizes.py").write_text(text)
-        keys.add(find_key(replace(run, solver=f"{home}/mine.py:search")))
-    assert len(keys) == 4
-    home.rename(elsewhere)
-    assert find_key(replace(run, solver=f"{elsewhere}/mine.py:search")) in keys
-
-
 def test_a_gradient_run_depends_only_on_what_it_heeds() -> None:
     def find(solver: str, **stop: Any) -> str:
         return find_key(Run(problem=STUDY.problems[0], solver=solver, stop=Stop(**stop)))
