@@ -2,7 +2,7 @@
 
     python -m benchmarks.engine [TABLE ...]
 
-About half an hour for all but ``tuned`` on one core; ``tuned`` runs if it is named, takes eight hours and continues where it
+About half an hour for all but ``tuned`` on one core; ``tuned`` runs if it is named, takes six hours and continues where it
 stopped. Each table has a title. Nothing is tuned per gait or speed.
 """
 

@@ -1,8 +1,9 @@
-"""The recorded study of the engine as objective: NAO's cycle in four settings, resumable in the folder ``tuned``."""
+"""The recorded study of the engine as objective, resumable in the folder ``tuned``."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,39 +14,64 @@ from compare.questions.question import Work, find
 from compare.questions.sweep import Axis
 from compare.questions.tune import Tune, TunedGait
 from compare.study.memo import Memo
+from nlp_gait.files import make_file_name
+from nlp_gait.simulation.balance.controller import Balance
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import Bumps
 from nlp_gait.simulation.simulate import Conditions
 
 FOLDER = Path("tuned")
+NAO, JVRC1 = {"name": "nao-cycle"}, {"name": "humanoid-cycle", "robot": "jvrc-description:jvrc1"}
+LIMITS = (Axis(name="ssp_dbm_y_mean_limit_m", values=(0.003, 0.006, 0.01, 0.015, 0.02)),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """A robot in a world, and how much of it is searched."""
+
+    problem: Mapping[str, str]  #: arguments of ``nlp_gait.load``
+    drive: Drive = Drive()
+    conditions: Conditions = Conditions()
+    runs: int = 11  #: of each search
+    simulations: int = 300  #: of a search
+    limits: Sequence[Axis] = LIMITS  #: that IPOPT tunes
+
+
+BALANCED = {"problem": JVRC1, "drive": Drive(feedback=Balance()), "runs": 3, "simulations": 100, "limits": ()}
 SETTINGS = {
-    "calm": (Drive(), Conditions()),
-    "bumps of 1 mm": (Drive(), Conditions(bumps=Bumps(height_m=0.001))),
-    "mass +5 %": (Drive(), Conditions(mass_factor=1.05)),
-    "no feed-forward": (Drive(feed_forward="none"), Conditions()),
+    "NAO, calm": Setting(problem=NAO),
+    "NAO, bumps of 1 mm": Setting(problem=NAO, conditions=Conditions(bumps=Bumps(height_m=0.001))),
+    "NAO, mass +5 %": Setting(problem=NAO, conditions=Conditions(mass_factor=1.05)),
+    "NAO, no feed-forward": Setting(problem=NAO, drive=Drive(feed_forward="none")),
+    "JVRC-1 with balance, calm": Setting(**BALANCED),
+    "JVRC-1 with balance, bumps of 5 mm": Setting(**BALANCED, conditions=Conditions(bumps=Bumps(height_m=0.005))),
 }
-LIMITS = [Axis(name="ssp_dbm_y_mean_limit_m", values=(0.003, 0.006, 0.01, 0.015, 0.02))]
 
 
 def tuned() -> Iterator[str]:
-    """NAO's cycle tuned in the engine: four settings, 11 runs of 300 simulations, about eight hours of processor time."""
-    yield from _tabulate(SETTINGS, runs=11, simulations=300)
+    """Cycles tuned in the engine: NAO's in four settings, JVRC-1's in two; six hours of processor time."""
+    yield from _tabulate(SETTINGS)
 
 
 def tuned_briefly() -> Iterator[str]:
-    """The same for a calm floor alone: one run of 100 simulations."""
-    yield from _tabulate(["calm"], runs=1, simulations=100)
+    """The same for NAO on a calm floor alone: one run of 100 simulations."""
+    yield from _tabulate({"NAO, calm": Setting(problem=NAO, runs=1, simulations=100)})
 
 
-def _tabulate(settings: Iterable[str], runs: int, simulations: int) -> Iterator[str]:
+def _tabulate(settings: Mapping[str, Setting]) -> Iterator[str]:
     yield header("setting", "gait", "simulations", "J/m", "held-out floors", "model", "falls", "runs")
-    for setting in settings:
-        drive, conditions = SETTINGS[setting]
-        effort = {"runs": runs, "simulations": simulations, "limits": LIMITS}
-        question = Tune(problem=nlp_gait.load("nao-cycle"), drive=drive, conditions=conditions, **effort)
-        rows = find(question, Work(memo=Memo(FOLDER / setting.replace(" ", "-"))))
+    for name, setting in settings.items():
+        question = Tune(
+            problem=nlp_gait.load(**setting.problem),
+            drive=setting.drive,
+            conditions=setting.conditions,
+            runs=setting.runs,
+            simulations=setting.simulations,
+            limits=setting.limits,
+        )
+        rows = find(question, Work(memo=Memo(FOLDER / make_file_name(name.replace(" ", "-")))))
         for solver in dict.fromkeys(row.solver for row in rows):
-            yield cells(setting, solver, *_summarise([row for row in rows if row.solver == solver]))
+            yield cells(name, solver, *_summarise([row for row in rows if row.solver == solver]))
 
 
 def _summarise(rows: list[TunedGait]) -> Iterator[str]:
