@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,6 @@ from nlp_gait.simulation.mjcf import Bumps
 from nlp_gait.simulation.simulate import Conditions
 
 FOLDER = Path("tuned")
-NAO, JVRC1 = {"name": "nao-cycle"}, {"name": "humanoid-cycle", "robot": "jvrc-description:jvrc1"}
 LIMITS = (Axis(name="ssp_dbm_y_mean_limit_m", values=(0.003, 0.006, 0.01, 0.015, 0.02)),)
 
 
@@ -29,7 +28,8 @@ LIMITS = (Axis(name="ssp_dbm_y_mean_limit_m", values=(0.003, 0.006, 0.01, 0.015,
 class Setting:
     """A robot in a world, and how much of it is searched."""
 
-    problem: Mapping[str, str]  #: arguments of ``nlp_gait.load``
+    problem: str = "nao-cycle"
+    options: Mapping[str, str] = field(default_factory=dict)  #: of the problem
     drive: Drive = Drive()
     conditions: Conditions = Conditions()
     runs: int = 11  #: of each search
@@ -37,12 +37,19 @@ class Setting:
     limits: Sequence[Axis] = LIMITS  #: that IPOPT tunes
 
 
-BALANCED = {"problem": JVRC1, "drive": Drive(feedback=Balance()), "runs": 3, "simulations": 100, "limits": ()}
+BALANCED = {
+    "problem": "humanoid-cycle",
+    "options": {"robot": "jvrc-description:jvrc1"},
+    "drive": Drive(feedback=Balance()),
+    "runs": 3,
+    "simulations": 100,
+    "limits": (),
+}
 SETTINGS = {
-    "NAO, calm": Setting(problem=NAO),
-    "NAO, bumps of 1 mm": Setting(problem=NAO, conditions=Conditions(bumps=Bumps(height_m=0.001))),
-    "NAO, mass +5 %": Setting(problem=NAO, conditions=Conditions(mass_factor=1.05)),
-    "NAO, no feed-forward": Setting(problem=NAO, drive=Drive(feed_forward="none")),
+    "NAO, calm": Setting(),
+    "NAO, bumps of 1 mm": Setting(conditions=Conditions(bumps=Bumps(height_m=0.001))),
+    "NAO, mass +5 %": Setting(conditions=Conditions(mass_factor=1.05)),
+    "NAO, no feed-forward": Setting(drive=Drive(feed_forward="none")),
     "JVRC-1 with balance, calm": Setting(**BALANCED),
     "JVRC-1 with balance, bumps of 5 mm": Setting(**BALANCED, conditions=Conditions(bumps=Bumps(height_m=0.005))),
 }
@@ -55,14 +62,14 @@ def tuned() -> Iterator[str]:
 
 def tuned_briefly() -> Iterator[str]:
     """The same for NAO on a calm floor alone: one run of 100 simulations."""
-    yield from _tabulate({"NAO, calm": Setting(problem=NAO, runs=1, simulations=100)})
+    yield from _tabulate({"NAO, calm": Setting(runs=1, simulations=100)})
 
 
 def _tabulate(settings: Mapping[str, Setting]) -> Iterator[str]:
     yield header("setting", "gait", "simulations", "J/m", "held-out floors", "model", "falls", "runs")
     for name, setting in settings.items():
         question = Tune(
-            problem=nlp_gait.load(**setting.problem),
+            problem=nlp_gait.load(setting.problem, **setting.options),
             drive=setting.drive,
             conditions=setting.conditions,
             runs=setting.runs,
