@@ -106,3 +106,13 @@ def test_means_and_gains_of_lshade_by_hand() -> None:
     before = np.array([4.0, 2.0, 0.0, 0.0]), np.array([1.0, 1.0, 10.0, 10.0])
     after = np.array([0.0, 1.0, 0.0, 0.0]), np.array([9.0, 9.0, 5.0, 8.0])
     np.testing.assert_allclose(compute_gains(before, after), [1.0, 0.25, 1.0, 0.4])
+
+
+def test_the_first_trials_of_lshade_cross_half_of_the_variables() -> None:
+    """Its memory of rates begins at 0.5 (Tanabe and Fukunaga 2014, section III)."""
+    lower, upper = np.zeros(200), np.ones(200)
+    members = np.random.default_rng(3).uniform(lower, upper, (100, 200))
+    start = Start(lower=lower, upper=upper, initial=members, evaluations=10**6, rng=np.random.default_rng(4))
+    search = make_algorithm("lshade", population=100).start(start)
+    search.tell(search.ask(), np.arange(100.0), np.zeros(100), FEASIBILITY)
+    assert np.mean(search.ask() != members) == pytest.approx(0.5, abs=0.05)

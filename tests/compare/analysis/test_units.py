@@ -4,7 +4,14 @@ import math
 
 import pytest
 
-from compare.analysis.units import format_millimetres, format_number, format_percent, with_unit
+from compare.analysis.units import (
+    BY_UNIT,
+    choose_natural_step,
+    format_millimetres,
+    format_number,
+    format_percent,
+    with_unit,
+)
 
 
 @pytest.mark.parametrize(
@@ -31,3 +38,12 @@ def test_units_follow_numbers_whose_digits_mean_something() -> None:
     assert (with_unit(-1e-9, "W", ".3f"), with_unit(-1e-9, "1", "g")) == ("0.000 W", "-1e-09")
     assert format_millimetres(-1e-6) == "0.0 mm" and format_millimetres(None) == "-"
     assert format_percent(None) == format_percent(math.inf) == "-"
+
+
+@pytest.mark.parametrize("unit", BY_UNIT)
+def test_a_natural_step_is_what_its_words_say(unit: str) -> None:
+    step = choose_natural_step(unit, 1.0)
+    number, _, shown = step.words.partition(" ")
+    scale = {"mm": 1e-3, "mm/s": 1e-3, "degree": math.pi / 180}.get(shown, 1.0)
+    assert step.size == pytest.approx(float(number) * scale)
+    assert shown in (unit, f"m{unit}", "degree") or not shown
