@@ -30,6 +30,8 @@ SOLE_THICKNESS_M = 0.004  # points of a foot this close to its lowest one are on
 CLEARLY_LOWER_M = 0.1  # the joints of the feet are lower than those of any other mirrored pair by this
 CLEAR_LEAD_M = 0.03  # soles whose parts in front of and behind the ankle differ by this show the forward direction
 NEGLIGIBLE_INERTIA = 0.01  # of a link, as a share of that of the robot's mass at its size
+NEGLIGIBLE_MASS = 0.005  # of a link, as a share of the robot's
+DENSEST = 22590.0  # of solids, osmium [kg/m^3]
 PAIRED_M, PAIRED_COSINE = 1e-2, 0.99  # axes of a pair of joints are images of each other to this
 LEAST_JOINTS = 3  # of limbs that may be legs
 LEAST_WIDTH_M = 0.01  # a narrower sole is a line or a point
@@ -176,7 +178,10 @@ def _find_nearest(placed: PlacedJoint, other: PlacedJoint | None = None) -> Arra
 
 
 def check_sizes(robot: str, links: Links, joints: Joints, notes: list[str]) -> None:
-    """Raise RobotDataError for a link spread further than the root and the joints of the robot, if its inertia matters."""
+    """Note links more concentrated than any matter; raise RobotDataError for one spread further than root and joints.
+
+    Of all bodies of a mass and a largest density, a ball has the least trace of the tensor, 6/5 m r^2. Light links do not matter.
+    """
     places = [np.zeros(3), *(chain[0].place for chain in _find_chains(joints).values())]
     size = float(np.linalg.norm(np.ptp(places, axis=0)))
     mass_kg = sum(link.mass_kg for link in links.values())
@@ -192,6 +197,16 @@ def check_sizes(robot: str, links: Links, joints: Joints, notes: list[str]) -> N
                 f"robot {robot!r}: {fault}; tensors are in kg m^2: is it in kg mm^2, or of another scale?"
             )
         notes.append(f"{fault}; it is too light to matter")
+    points = [
+        name
+        for name, link in links.items()
+        if link.mass_kg > NEGLIGIBLE_MASS * mass_kg
+        and np.trace(link.inertia_matrix) < 1.2 * link.mass_kg * (3 * link.mass_kg / (4 * math.pi * DENSEST)) ** (2 / 3)
+    ]
+    if points:
+        notes.append(
+            f"tensors of {', '.join(points)} are smaller than of a ball of osmium of that mass: another unit, or point masses?"
+        )
 
 
 def infer_feet(

@@ -5,6 +5,7 @@ Nothing but corners is read, and hostile files are refused; libraries for meshes
 
 import math
 import os
+import re
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -44,7 +45,9 @@ def find_mesh(address: str, robot_file: Path) -> Path | None:
         Path(folder) for name in FOLDER_VARIABLES for folder in os.environ.get(name, "").split(os.pathsep) if folder
     ]
     above = [*robot_file.absolute().parents, *listed, *(folder / "share" for folder in listed)]
-    inside = [folder for folder in above if folder.name == path.parts[0]]
+    inside = [
+        folder for folder in above if re.fullmatch(rf"{re.escape(path.parts[0])}(-.*)?", folder.name)
+    ]  # ZIP: -main
     candidates = [*(folder / path for folder in above), *(folder.joinpath(*path.parts[1:]) for folder in inside)]
     return next((file for file in candidates if os.path.isfile(file)), None)
 

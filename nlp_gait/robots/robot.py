@@ -75,8 +75,8 @@ class Link:
         if low < -slack or low + middle < high - slack:
             raise RobotDataError(
                 f"{owner}: inertia_com_kgm2 has principal moments {low:.3e}, {middle:.3e}, {high:.3e} kg m^2; a rigid body "
-                "needs all >= 0 and none above the sum of the other two. A tensor about the joint origin in place of "
-                "the centre of mass is the usual cause: subtract m (c.c I - c c^T)"
+                "needs all >= 0 and none above the sum of the other two. Tensors about any point satisfy that: is a number "
+                "mistyped, or was the tensor shifted to the centre of mass twice?"
             )
 
     @property

@@ -1,5 +1,6 @@
 """Inertia tensors about the wrong point are found and explained, and those of the real robots pass."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,12 @@ import pytest
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots import Link, list_robots, load_robot
 from nlp_gait.robots.tree import check_inertias, compute_joint_ratio, shift_to_com
+from tests.robots.crooked import TORSO_KG, crooked, crooked_urdf
 from tests.robots.custom import about_joints, humanoid, nao, six, written
 
 # Sums of products of numbers with six digits.
 TOLERANCE = 1e-15
+BASE = TORSO_KG * 0.25**2 / 6.0  # moment of inertia of the torso
 ROD = Link(name="rod", mass_kg=3.0, com_m=(0.0, 0.0, -0.5), inertia_com_kgm2=(0.25, 0.25, 0.0, 0.0, 0.0, 0.0))
 BALL = Link(name="ball", mass_kg=1.0, com_m=(0.1, 0.0, 0.0), inertia_com_kgm2=(0.02, 0.02, 0.02, 0.0, 0.0, 0.0))
 
@@ -85,3 +88,17 @@ def test_few_links_or_links_near_their_joints_prove_nothing() -> None:
     for links in ([far] * 5, [far, far, far, near, near, near]):
         with pytest.raises(RobotDataError, match=rf"robot 'wrong'.*none of its {len(links)} links"):
             check_inertias("wrong", named(*links))
+
+
+def test_a_link_denser_than_osmium_is_noted(tmp_path: Path) -> None:
+    """Half the tensor of a ball of osmium of 9 kg, 0.4 m r^2 with 22.59 g/cm^3, is noted; that of a ball of iron is not."""
+    notes = []
+    for density, factor in ((7874.0, 1.0), (22590.0, 0.5)):
+        radius = (TORSO_KG / (4 / 3 * math.pi * density)) ** (1 / 3)
+        moment = factor * 0.4 * TORSO_KG * radius**2
+        text = crooked_urdf().replace(
+            f'ixx="{BASE}" iyy="{BASE}" izz="{BASE}"', f'ixx="{moment}" iyy="{moment}" izz="{moment}"'
+        )
+        assert text != crooked_urdf()
+        notes.append([note for note in load_robot(crooked(tmp_path, text)).notes if "osmium" in note])
+    assert notes[0] == [] and len(notes[1]) == 1 and "of base are" in notes[1][0]

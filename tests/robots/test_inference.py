@@ -13,6 +13,7 @@ from nlp_gait.errors import InputError, RobotDataError, warn_once
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.robots.leg import make_leg
+from nlp_gait.robots.meshes import find_mesh
 from nlp_gait.robots.tree import find_partner, find_partners
 from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
 
@@ -128,6 +129,16 @@ def test_a_mesh_is_needed_only_where_a_sole_comes_from_it(tmp_path: Path) -> Non
     assert foot.front_m + foot.back_m == pytest.approx(0.2)
     (folder / "sole.stl").unlink()
     assert load_robot(override(path, feet=name_feet("ankle_roll"))).feet["right"].back_m == 0.05
+
+
+@pytest.mark.parametrize("folder", ["feet", "feet-main", "feet-1.2"])  # a clone, and archives of GitHub
+def test_a_package_is_known_by_its_folder(tmp_path: Path, folder: str) -> None:
+    (tmp_path / folder / "urdf").mkdir(parents=True)
+    mesh = tmp_path / folder / "sole.stl"
+    mesh.write_text("")
+    model = tmp_path / folder / "urdf" / "robot.urdf"
+    assert find_mesh("package://feet/sole.stl", model) == mesh
+    assert find_mesh("package://hands/sole.stl", model) is find_mesh("package://fee/sole.stl", model) is None
 
 
 def change(old: str, new: str) -> Callable[[str], str]:
