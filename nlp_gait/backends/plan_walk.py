@@ -327,27 +327,33 @@ def _solve(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkSettin
         if best.converged:
             break
     assert best is not None  # at least one start
-    numbers = _evaluate(best, FINE_GRID)
     while settings.intervals is None and best.converged:
-        intervals = int(best.problem.options["intervals"])
-        error = abs(_evaluate(best, intervals)["energy_J"] / numbers["energy_J"] - 1.0)
-        if error < ENERGY_ERROR or intervals >= LAST_GRID:
+        finer = choose_finer_grid(best.problem, best.best.x, settings)
+        if finer is None:
             break
-        more = min(LAST_GRID, math.ceil(FINER * intervals))
-        settings.progress(f"{intervals} intervals of a phase: energy {error:.1%} off, now {more}")
-        finer = load(problem.name, **{**problem.options, "intervals": more}).with_values(**problem.values)
         solution = solve(finer, x0=best.best.x, solver=IpoptSettings(few_rows=False), workers=1)
         if not solution.feasible:
             break
-        best, numbers = solution, _evaluate(solution, FINE_GRID)
-    return WalkPlan(solution=best, **numbers)
+        best = solution
+    return WalkPlan(solution=best, **_evaluate(best.problem, best.best.x, FINE_GRID))
 
 
-def _evaluate(solution: Solution, intervals: int) -> dict[str, float]:
+def choose_finer_grid(problem: GaitProblem, x: Array, settings: WalkSettings) -> GaitProblem | None:
+    """Return a walk on the next finer grid, or None if its energy at x is right or its grid is the last."""
+    intervals = int(problem.options["intervals"])
+    coarse, fine = (_evaluate(problem, x, count)["energy_J"] for count in (intervals, FINE_GRID))
+    error = abs(coarse / fine - 1.0)
+    if error < ENERGY_ERROR or intervals >= LAST_GRID:
+        return None
+    more = min(LAST_GRID, math.ceil(FINER * intervals))
+    settings.progress(f"{intervals} intervals of a phase: energy {error:.1%} off, now {more}")
+    return load(problem.name, **{**problem.options, "intervals": more}).with_values(**problem.values)
+
+
+def _evaluate(problem: GaitProblem, x: Array, intervals: int) -> dict[str, float]:
     """Return distance, duration and energy of a walk on a grid with at least so many intervals a phase."""
-    problem = solution.problem
     fine = problem.dense(math.ceil(intervals / int(problem.options["intervals"]))) or problem
-    indexes = build_exact_model(fine).at(solution.best.x, fine.p).indexes
+    indexes = build_exact_model(fine).at(x, fine.p).indexes
     return {name: float(indexes[name]) for name in ("distance_m", "duration_s", "energy_J")}
 
 
@@ -360,6 +366,10 @@ def _run_starts(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkS
             gait = solve(cycle, seed=k, workers=1)
             settings.progress(f"start {k + 1}, cycle: {gait.status}")
             x0 = start_from_cycle(problem, x0, gait.x, float(problem.options.get("stair_rise_m", 0.0)))
+            if k == 0 and settings.intervals is None and gait.converged:
+                problem = (
+                    choose_finer_grid(problem, x0, settings) or problem
+                )  # before a library for the coarse grid is built
         for barrier in BARRIERS:
             if barrier not in solvers:  # the second one is rarely needed
                 ipopt = IpoptSettings(few_rows=False, barrier=barrier)

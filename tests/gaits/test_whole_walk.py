@@ -10,7 +10,14 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.plan_walk import MARGINS, WalkPlan, WalkSettings, describe_violation, plan_walk
+from nlp_gait.backends.plan_walk import (
+    MARGINS,
+    WalkPlan,
+    WalkSettings,
+    choose_finer_grid,
+    describe_violation,
+    plan_walk,
+)
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result, load_result
@@ -147,6 +154,22 @@ def test_the_grid_of_a_plan_is_chosen_by_its_energy(monkeypatch: pytest.MonkeyPa
     assert plan.feasible and problem.options["intervals"] > 2 and fine is not None
     energies = [build_exact_model(p).at(x, p.p).indexes["energy_J"] for p in (coarse, fine)]
     assert energies[0] == pytest.approx(energies[1], rel=0.01) and plan.energy_J == pytest.approx(energies[1], rel=1e-3)
+
+
+def test_a_start_shows_whether_a_grid_is_too_coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A grid is refined where the energy differs from that on a fine one by more than a limit; fixed values stay."""
+    monkeypatch.setattr("nlp_gait.backends.plan_walk.ENERGY_ERROR", 0.001)
+    for intervals in (2, 40):
+        problem = nlp_gait.load("nao-walk", steps=3, intervals=intervals).fix(step_length_m=0.05)
+        x, said = np.clip(problem.start_point(np.random.default_rng(0)), problem.lower, problem.upper), list[str]()
+        fine = nlp_gait.load("nao-walk", steps=3, intervals=120)
+        energies = [build_exact_model(p).at(x, p.p).indexes["energy_J"] for p in (problem, fine)]
+        error = abs(energies[0] / energies[1] - 1.0)
+        finer = choose_finer_grid(problem, x, WalkSettings(progress=said.append))
+        assert (error > 0.001) is (intervals == 2) is (finer is not None)
+        if finer is not None:
+            assert said == [f"2 intervals of a phase: energy {error:.1%} off, now 3"]
+            assert finer.options["intervals"] == 3 and finer.values == problem.values
 
 
 def test_margins_are_shares_of_the_sole_in_plans_and_not_in_problems(problem: GaitProblem) -> None:
