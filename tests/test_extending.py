@@ -49,7 +49,6 @@ class MostHipSpeed(Limit):
         return [row], {}
 
 
-@pytest.mark.slow
 def test_a_limit_of_a_gait_is_one_class() -> None:
     """It is added to those of single support, limits the motion there, and has a parameter."""
     body, grid = make_nao("nao-v5"), Grid(intervals=4)

@@ -137,7 +137,6 @@ def test_friction_and_height_are_those_of_mujoco() -> None:
 
 
 @pytest.mark.commit
-@pytest.mark.slow
 def test_a_limit_costs_what_it_must_and_is_guaranteed_between_samples() -> None:
     problem = nlp_gait.load("nao-ssp", intervals=4)
     higher = problem.with_limits(single_support=[FootClearance()]).with_values(foot_clearance_m=0.02)

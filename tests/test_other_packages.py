@@ -35,7 +35,6 @@ def X(instance: gaitbench.Instance) -> Array:
     return np.random.default_rng(5).uniform(instance.lower, instance.upper, (40, len(instance.names)))
 
 
-@pytest.mark.slow
 def test_pygmo(pygmo: Any, instance: gaitbench.Instance, X: Array) -> None:
     """Objective, rows and gradients; a copy in an archipelago's thread and a gradient solver work on it."""
     problem = instance.to("pygmo")

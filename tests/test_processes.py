@@ -74,7 +74,6 @@ def is_over(end: float) -> bool:
     return time.monotonic() > end
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("alone", [False, True])
 @pytest.mark.parametrize("method", METHODS)
 def test_each_job_ends_in_its_own_way_and_the_others_return(method: str, alone: bool) -> None:
@@ -200,7 +199,6 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_no_process_outlives_a_parent_that_is_killed() -> None:
     parent = subprocess.Popen(

@@ -81,7 +81,6 @@ def test_batch_size_threads_and_pickling_change_no_bit() -> None:
     assert all(np.array_equal(few, many[:13]) for few, many in zip(part, first, strict=True))
 
 
-@pytest.mark.slow
 def test_derivatives_are_compiled_functions() -> None:
     x, p = ca.MX.sym("x", 3), ca.MX.sym("p")
     function = ca.Function("f", [x, p], [p * ca.sumsqr(ca.sin(x)), x * p], ["x", "p"], ["cost", "rows"])

@@ -70,7 +70,6 @@ BAD: dict[str, tuple[Mathematics, str]] = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("mathematics", GOOD.values(), ids=GOOD.keys())
 def test_lifting_along_the_sense_is_exact_at_the_optimum(mathematics: Mathematics) -> None:
     solution = solve(toy(mathematics), starts=2)

@@ -30,7 +30,6 @@ def runs() -> list[RunRecord]:
     return [r for r in records if r.solver != "random"] + infeasible
 
 
-@pytest.mark.slow
 def test_a_table_gives_the_same_rankings_as_the_records(
     runs: list[RunRecord], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

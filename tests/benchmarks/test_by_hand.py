@@ -12,7 +12,6 @@ from benchmarks.by_hand import ByHand  # noqa: E402
 TOLERANCE = 1e-11
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("without_compiler")
 def test_numpy_and_pinocchio_give_the_package_s_values() -> None:
     by_hand = ByHand()

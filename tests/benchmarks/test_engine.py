@@ -10,7 +10,6 @@ from benchmarks.engine import agreement, gaits  # noqa: E402
 from compare.judge import evaluate  # noqa: E402
 
 
-@pytest.mark.slow
 def test_random_gaits_are_feasible_and_seeded():
     problem = nlp_gait.load("nao-dsp")
     found = gaits.random_gaits(problem, 3, seed=3)
@@ -19,7 +18,6 @@ def test_random_gaits_are_feasible_and_seeded():
     np.testing.assert_array_equal([gait.x for gait in found], [gait.x for gait in again])
 
 
-@pytest.mark.slow
 def test_the_engine_ranks_random_gaits_of_double_support_as_the_model_does(monkeypatch):
     monkeypatch.setattr(agreement, "RANDOM", 3)
     monkeypatch.setattr(agreement, "RANKED", {"feed-forward": agreement.RANKED["feed-forward"]})

@@ -27,7 +27,6 @@ def test_an_example_reads_no_arguments(name: str) -> None:
     assert "argv" not in (EXAMPLES / name).read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "printed", "file"), [("first_solve.py", "limited by dbm_y_mean", "gait.png")])
 def test_a_notebook_runs_in_an_empty_folder(name: str, printed: str, file: str, tmp_path: Path) -> None:
     text, figures = run_notebook(make_notebook(EXAMPLES / name), tmp_path)

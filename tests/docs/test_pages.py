@@ -81,7 +81,6 @@ def test_every_problem_has_a_page() -> None:
     assert set(problems.difficulties()) <= set(problems.names())
 
 
-@pytest.mark.slow
 def test_the_sizes_of_the_nlps_are_those_of_today() -> None:
     rows = {line.split("`")[1]: line.split(" | ") for line in problems.nlp_sizes().splitlines() if "`" in line}
     assert set(rows) == set(problems.names())
@@ -90,7 +89,6 @@ def test_the_sizes_of_the_nlps_are_those_of_today() -> None:
         assert rows[name][1:4] == [str(model.nlp["x"].numel()), str(model.lifted), str(model.nlp["g"].numel())]
 
 
-@pytest.mark.slow
 def test_the_page_of_a_problem_is_made_from_the_problem() -> None:
     problem, found = load("nao-dsp"), problems.difficulties()["nao-dsp"]
     page = problems.problem_page(problem, found)

@@ -72,7 +72,6 @@ def test_an_example_is_short(name: str) -> None:
 
 
 @pytest.mark.commit
-@pytest.mark.slow
 @pytest.mark.parametrize("name", EXPECTED)
 def test_example(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -93,7 +92,6 @@ def test_example(
     plt.close("all")
 
 
-@pytest.mark.slow
 def test_a_paper_of_two_files_is_reproduced_by_the_command(tmp_path: Path) -> None:
     """From any folder that has both files, with its searches."""
     for name in ("your_own_paper.py", "your_own_paper.csv", "your_own_problem.py"):
@@ -107,7 +105,6 @@ def test_a_paper_of_two_files_is_reproduced_by_the_command(tmp_path: Path) -> No
     }
 
 
-@pytest.mark.slow
 def test_the_three_kinds_of_user_code(capsys: pytest.CaptureFixture[str]) -> None:
     runpy.run_path(str(ROOT / "examples" / "bring_your_own.py"), run_name="__main__")
     assert "annealing, 2000 evaluations: power " in capsys.readouterr().out

@@ -24,7 +24,6 @@ def result():
     return Result(problem=problem, x=problem.check_x(DSP))
 
 
-@pytest.mark.slow
 def test_csv_has_plain_headers_with_units_and_rows_exactly_a_period_apart(result, tmp_path):
     path = tmp_path / "gait.csv"
     write_as("csv", path, result, 100)
@@ -54,7 +53,6 @@ def test_ros_trajectory_is_exactly_periodic_and_agrees_with_the_csv(result, tmp_
     np.testing.assert_allclose(points[20]["effort"], signals.arrays["tau"][3], atol=1e-9)
 
 
-@pytest.mark.slow
 def test_both_phases_of_a_cycle_have_rows_exactly_a_millisecond_apart():
     problem = nlp_gait.load("nao-cycle")
     middle = (problem.lower + problem.upper) / 2

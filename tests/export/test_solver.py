@@ -14,7 +14,6 @@ from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.export.solver import export_solver
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not (shutil.which("c++") and shutil.which("cc")), reason="no C and C++ compiler")
 @pytest.mark.parametrize("flags", ["", "-DLANES=1"])
 def test_the_example_in_c_finds_casadis_numbers(tmp_path: Path, flags: str) -> None:

@@ -48,7 +48,6 @@ def by_the_grammar(text):
     return names, times, np.array(poses)
 
 
-@pytest.mark.slow
 def test_a_gait_is_written_every_40_ms_and_read_back(points):
     text = format_motion(points)
     names, times, poses = by_the_grammar(text)
@@ -58,7 +57,6 @@ def test_a_gait_is_written_every_40_ms_and_read_back(points):
     assert text.splitlines()[1].startswith("00:00:000,Pose1,")
 
 
-@pytest.mark.slow
 @given(
     st.lists(st.integers(0, 5_000_000), min_size=1, max_size=6, unique=True),
     st.lists(st.floats(-4, 4), min_size=3, max_size=3),

@@ -21,7 +21,6 @@ CODE = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", CODE)
 def test_no_code_judges_itself(name: str, tmp_path: Path) -> None:
     """What is recorded is evaluated and counted by this process, or the run has failed."""

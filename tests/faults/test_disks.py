@@ -11,7 +11,6 @@ from tests.compare.cli.calls import nlp_gait
 from tests.faults.processes import in_own_mounts
 
 
-@pytest.mark.slow
 def test_a_study_stores_its_finished_runs_and_continues_when_there_is_room(
     tmp_path: Path, coarse_pictures: None
 ) -> None:
@@ -34,7 +33,6 @@ def test_a_study_stores_its_finished_runs_and_continues_when_there_is_room(
     assert len(list(tmp_path.glob("kept/records/*/*.json"))) == 20
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "printed"),
     [

@@ -82,7 +82,6 @@ KEPT = r"; the results are in .*"
 NOTHING = r"; (\d) finished results are stored in .*"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("owner", "name", "calls", "line", "said", "table"),
     [
@@ -110,7 +109,6 @@ def test_a_question_writes_what_it_has_or_counts_what_is_stored(
         assert [path.name for path in tmp_path.iterdir()] == ["store"]
 
 
-@pytest.mark.slow
 def test_compare_with_worker_processes_is_continued_by_the_same_command(tmp_path: Path) -> None:
     """As a terminal does it: the signal goes to the workers too."""
     study = "compare walk12 --algorithms pso --runs 400 --starts 0 --evaluations 2000 --jobs 2 --out"
@@ -154,7 +152,6 @@ main()
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("module", ["typer", "nlp_gait.backends.kernel.compiled"])
 def test_while_modules_are_imported(module: str) -> None:
     """Before the command has begun, and within it."""

@@ -43,7 +43,6 @@ def list_offspring(parent: int) -> dict[int, str]:
     return {child: processes[child][1] for child in below & processes.keys() - {parent}}
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
 @pytest.mark.parametrize(
     ("name", "started"), [("SIGKILL", "workers"), ("SIGINT", "sleep 600"), ("SIGTERM", "sleep 600")]
@@ -69,7 +68,6 @@ def test_workers_and_compilers_end_with_what_started_them(name: str, started: st
     wait_for(lambda: not offspring.keys() & list_offspring(0).keys(), SECONDS)
 
 
-@pytest.mark.slow
 def test_four_processes_of_one_study_that_are_killed_lose_nothing_and_the_same_command_continues(
     tmp_path: Path,
 ) -> None:
@@ -103,7 +101,6 @@ def test_durations_do_not_follow_the_clock_on_the_wall(tmp_path: Path, monkeypat
     assert min(solution.time_s.build, solution.time_s.compile, solution.starts[0].time_s) >= 0.0
 
 
-@pytest.mark.slow
 def test_a_limit_of_open_files_is_one_sentence_and_keeps_runs(tmp_path: Path, coarse_pictures: None) -> None:
     line = f"compare walk12 --algorithms random --starts 0 --evaluations 60 --out {tmp_path} --jobs"
     calls.nlp_gait(*line.split(), "1", "--runs", "2")

@@ -20,7 +20,6 @@ from nlp_gait.formulation import GaitProblem
 from tests.faults.processes import ROOT
 
 
-@pytest.mark.slow
 def test_four_threads_solve_one_problem_and_build_it_once() -> None:
     problem = nlp_gait.load("walk12")
     points = [problem.start_point(np.random.default_rng(k)) for k in range(4)]
@@ -111,7 +110,6 @@ print("equal")
 METHODS = [m for m in ("fork", "spawn") if m in multiprocessing.get_all_start_methods()]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("program", "method"), [*((FORKED, method) for method in METHODS), (BUSY, "")])
 def test_what_was_used_goes_to_other_processes(program: str, method: str, tmp_path: Path) -> None:
     """A fork waits until no other thread is inside CasADi."""
@@ -146,7 +144,6 @@ for name, settings in (("ipopt", {}), ("slsqp", {"evaluations": 100})):
 """
 
 
-@pytest.mark.slow
 def test_every_solver_repeats_its_result_in_other_processes() -> None:
     """One process has one thread and a fixed hash seed, this one all threads and any hash seed."""
     one = subprocess.run(

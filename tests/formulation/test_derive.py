@@ -68,7 +68,6 @@ def test_a_changed_problem_has_its_own_functions(how: str) -> None:
     assert f[0] == pytest.approx(5.0)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle", "walk12", "stairs-plan", "stairs-track"])
 def test_time_histories_are_those_of_the_base_problem(name: str) -> None:
     """With a parameter and a variable more, at the current values of both."""
@@ -104,7 +103,6 @@ def test_denser_grids_are_adapted(walk: GaitProblem) -> None:
     assert found.rows["least_slack"] == 0.5 and len(found.rows) == len(below.rows) + 2
 
 
-@pytest.mark.slow
 def test_the_compiled_objective_and_the_judge_see_it(walk: GaitProblem) -> None:
     changed = with_slack(walk)
     X: Array = np.column_stack([np.tile(WALK_X, (2, 1)), [0.1, 0.5]])

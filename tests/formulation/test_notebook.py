@@ -53,7 +53,6 @@ def test_a_solution_with_many_prices_displays_twenty(solution: nlp_gait.Solution
     assert "; 10 more in .x and .active_constraints" in shown and " more in " not in solution._repr_html_()
 
 
-@pytest.mark.slow
 def test_a_solution_displays_a_table_its_signals_and_its_gait(solution: nlp_gait.Solution) -> None:
     shown = solution._repr_html_()
     assert "hip_height_m" in shown and "W per m" in shown and len(shown) < 5000

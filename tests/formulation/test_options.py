@@ -62,7 +62,6 @@ def others(name: str) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.slow
 def test_stairs_are_recorded(tmp_path: Path) -> None:
     problem = load("humanoid-walk", robot=crooked(tmp_path), intervals=2, **STAIRS)
     again = load("humanoid-walk", **problem.options)
@@ -89,7 +88,6 @@ def test_every_option_is_recorded(name: str) -> None:
         assert (again.names, again.grid, again.parameters) == (problem.names, problem.grid, problem.parameters)
 
 
-@pytest.mark.slow
 def test_the_judge_counts_the_intervals_of_its_grid() -> None:
     """With three samples an interval it needs 34 times as many to have at least 1,000."""
     problem = load("nao-cycle", samples_per_interval=3)

@@ -30,7 +30,6 @@ def test_a_few_lines_by_hand_are_enough(tmp_path):
     np.testing.assert_array_equal(result.x, list(X.values()))
 
 
-@pytest.mark.slow
 def test_a_solution_is_read_with_its_options_and_parameters(tmp_path):
     problem = nlp_gait.load("nao-dsp", robot="nao-v6", torso_share="lever").with_values(torque_change_limit_Nm=1.1)
     solution = nlp_gait.solve(problem, starts=1, seed=0)

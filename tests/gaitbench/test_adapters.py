@@ -46,7 +46,6 @@ def test_pymoo(instance: gaitbench.Instance, X: Array, rows: bool) -> None:
     assert result.F[0] >= instance.best_known and result.CV[0] == 0.0
 
 
-@pytest.mark.slow
 def test_scipy_ends_at_the_best_known(instance: gaitbench.Instance) -> None:
     """SLSQP with our gradients, from beside the best known point, in the unit cube."""
     from scipy.optimize import minimize
@@ -58,7 +57,6 @@ def test_scipy_ends_at_the_best_known(instance: gaitbench.Instance) -> None:
     assert result.fun == pytest.approx(instance.best_known, rel=1e-5)
 
 
-@pytest.mark.slow
 def test_pycma(instance: gaitbench.Instance, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The worst row of each group; with it ``fmin_con2`` gets to a feasible point."""
     monkeypatch.chdir(tmp_path)  # pycma makes a folder there

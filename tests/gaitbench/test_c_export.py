@@ -35,7 +35,6 @@ def points(id: str, count: int = 130) -> Array:
     return np.random.default_rng(1).uniform(instance.lower, instance.upper, (count, len(instance.names)))
 
 
-@pytest.mark.slow
 def test_files_stand_alone(built: tuple[str, Path]) -> None:
     """No file of this package is included, and what is linked is libc and libm."""
     id, folder = built
@@ -110,7 +109,6 @@ def test_called_from_c(built: tuple[str, Path]) -> None:
         assert row[instance.row_names.index(line[3])] == pytest.approx(row.max(), rel=1e-9, abs=EQUAL)
 
 
-@pytest.mark.slow
 @pytest.mark.program("octave-cli", "mkoctfile")
 def test_called_from_octave(built: tuple[str, Path], tmp_path: Path) -> None:
     """Through the mex file: f, violation and G of several points, to the last digits that are printed."""

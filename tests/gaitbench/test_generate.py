@@ -88,7 +88,6 @@ def test_other_variables_keep_objective_rows_and_feasible_set() -> None:
     assert changed.dense(2) is not None
 
 
-@pytest.mark.slow
 def test_a_generated_instance_is_an_instance(walk: gaitbench.Instance) -> None:
     assert (walk.lower == 0.0).all() and (walk.upper == 1.0).all() and walk.id == ID
     f, violation = walk(walk.best_x[None])
@@ -106,7 +105,6 @@ def test_a_generated_instance_is_an_instance(walk: gaitbench.Instance) -> None:
     assert gaitbench.load(ID, unit_cube=True).best_known == walk.best_known
 
 
-@pytest.mark.slow
 def test_best_points_are_neither_at_the_bounds_nor_in_the_middle() -> None:
     """27 % of GaitBench 1's variables are at a bound, and up to 43 % in the middle."""
     z = np.concatenate([gaitbench.generate("walk12-stable", seed).best_x for seed in range(5)])

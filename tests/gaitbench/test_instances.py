@@ -48,7 +48,6 @@ def test_probe_values_never_change(id: str, published: gaitbench.Instance) -> No
         np.testing.assert_allclose(found, expected, rtol=PUBLISHED, atol=PUBLISHED, err_msg=f"{id}: {name}")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("id", gaitbench.list_instances())
 def test_the_best_known_point_is_feasible_and_has_its_value(published: gaitbench.Instance) -> None:
     """Violation exactly zero; no random point nearby is feasible and better by more than a millionth."""

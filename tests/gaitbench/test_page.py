@@ -28,7 +28,6 @@ def _compute_by_one_start(compute: Callable[..., Facts], instance: gaitbench.Ins
     return compute(instance, 1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("block", READY, ids=[re.sub(r"\W+", " ", block.splitlines()[0]) for block in READY])
 def test_python_of_the_page_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As pasted, in an empty folder. A drawn instance gets one start of IPOPT."""

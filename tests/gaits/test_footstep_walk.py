@@ -48,7 +48,6 @@ def plan(problem: GaitProblem) -> Plan:
     return make_plan(Result(problem=problem, x=problem.start_point(np.random.default_rng(0))))
 
 
-@pytest.mark.slow
 def test_feet_land_on_their_footholds_and_the_torso_faces_the_mean_of_both(body: Humanoid, plan: Plan) -> None:
     arrays, places = plan.signals.arrays, parse_footholds(plan_footholds(body))
     for side, foot in (("right", places[2]), ("left", places[3])):
@@ -63,7 +62,6 @@ def plan_footholds(body: Humanoid) -> str:
     return list_arc(TURN_DEG, STEPS, LENGTH_M, body.feet_y)
 
 
-@pytest.mark.slow
 def test_angles_and_rates_are_continuous_through_the_turn(plan: Plan) -> None:
     """On a dense grid no angle, rate or place jumps, though accelerations do at the switches."""
     arrays = plan.signals.arrays
@@ -75,7 +73,6 @@ def test_angles_and_rates_are_continuous_through_the_turn(plan: Plan) -> None:
         assert np.abs(np.diff(arrays[name], axis=0)).max() < 0.02
 
 
-@pytest.mark.slow
 def test_soles_and_yaw_are_those_of_the_engine(plan: Plan) -> None:
     """The engine's forward kinematics of the planned angles has the planned soles, level and turned as planned."""
     pytest.importorskip("mujoco")
@@ -92,7 +89,6 @@ def test_soles_and_yaw_are_those_of_the_engine(plan: Plan) -> None:
             np.testing.assert_allclose(axes[:, 0], [math.cos(yaw), math.sin(yaw), 0.0], atol=1e-9)
 
 
-@pytest.mark.slow
 def test_torques_and_forces_of_the_ground_satisfy_the_equations_of_motion(plan: Plan) -> None:
     """Of the whole robot by Pinocchio, over the left foot: a swinging foot that turns, and a turned foot that bears load."""
     oracle = pytest.importorskip("tests.pinocchio_oracle")
@@ -107,7 +103,6 @@ def test_torques_and_forces_of_the_ground_satisfy_the_equations_of_motion(plan: 
     assert arrays["right_force"][turned[1], 2] > 0.05 * weight
 
 
-@pytest.mark.slow
 def test_the_zmp_is_limited_by_the_hull_of_rotated_soles(problem: GaitProblem, body: Humanoid, plan: Plan) -> None:
     """Margins of a double support are the distances along the standing foot's axes to the sides of the hull."""
     x = problem.start_point(np.random.default_rng(0))
@@ -127,7 +122,6 @@ def test_the_zmp_is_limited_by_the_hull_of_rotated_soles(problem: GaitProblem, b
         assert rows[f"step1_dsp_dbm_{name}[2]"] == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.slow
 def test_energy_and_distance_are_those_of_all_phases(problem: GaitProblem, plan: Plan) -> None:
     x = problem.start_point(np.random.default_rng(0))
     indexes = build_exact_model(problem).at(x, problem.p).indexes
@@ -157,7 +151,6 @@ def test_footholds_are_read_from_a_file(tmp_path: Path) -> None:
         read_footholds(path)
 
 
-@pytest.mark.slow
 def test_the_sharpest_turn_names_its_limit(body: Humanoid) -> None:
     sharpest = find_sharpest_turn(body, 0.04)
     assert "passes over the standing one" in sharpest.stopped_by and 10.0 < sharpest.turn_deg < 90.0
@@ -201,7 +194,6 @@ def test_turns_that_cannot_be_planned_are_refused(options: dict[str, float], wor
         plan_route("nao-v5", **options)  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
 def test_every_inner_step_has_its_speed() -> None:
     """What both feet advance on average, by the time between lift-offs; NAO's feet stay parallel."""
     straight = list_arc(0.0, STEPS, LENGTH_M, make_nao("nao-v5").feet_y)

@@ -57,7 +57,6 @@ def list_phases(problem: GaitProblem, body: Body, x: Array) -> list[Signals]:
     return [phase.signals(problem.at(x)) for phase in cycle.phases.values()]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "make"), CASES)
 def test_energy_and_momentum_before_and_after_are_pinocchios(name: str, make: type[Body]) -> None:
     problem, body = load(name, landing="inelastic"), make("nao-v5")
@@ -75,7 +74,6 @@ def test_energy_and_momentum_before_and_after_are_pinocchios(name: str, make: ty
         assert indexes["touch_down_rate_jump_rad_s"] == pytest.approx(float(jump), rel=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-cycle", "humanoid-cycle"])
 def test_a_soft_landing_loses_nothing_and_is_the_cycle_without_impact(name: str) -> None:
     problem, soft = load(name, landing="inelastic"), load(name)

@@ -43,7 +43,6 @@ def x(problem: GaitProblem) -> np.ndarray:
     return problem.start_point(np.random.default_rng(0))
 
 
-@pytest.mark.slow
 def test_a_walk_begins_and_ends_at_rest_in_the_same_pose(problem: GaitProblem, x: np.ndarray) -> None:
     arrays = problem.signals(x).arrays
     for k in (0, -1):
@@ -55,7 +54,6 @@ def test_a_walk_begins_and_ends_at_rest_in_the_same_pose(problem: GaitProblem, x
     assert arrays["left_foot"][-1, 0] - arrays["left_foot"][0, 0] == pytest.approx((STEPS - 1) * step)
 
 
-@pytest.mark.slow
 def test_neighbouring_phases_share_angles_and_rates(problem: GaitProblem, x: np.ndarray) -> None:
     """On samples close to each other no angle and no rate of any joint jumps, though accelerations do."""
     dense = problem.dense(40)
@@ -68,7 +66,6 @@ def test_neighbouring_phases_share_angles_and_rates(problem: GaitProblem, x: np.
         assert jump < 0.6 * t.max() * largest  # accelerations jump by at most their largest value between two samples
 
 
-@pytest.mark.slow
 def test_a_walk_of_two_half_steps_has_no_inner_step() -> None:
     """It has no row, variable or speed of one, so no limit of an inner step can stop it."""
     two = nlp_gait.load("nao-walk", steps=2)
@@ -104,7 +101,6 @@ def test_on_a_slope_the_weight_acts_behind_the_centre_of_mass() -> None:
     assert Conditions().gravity(9.8) == (0.0, 0.0, -9.8)
 
 
-@pytest.mark.slow
 def test_energy_and_duration_count_every_inner_step(x: np.ndarray) -> None:
     found = {}
     for steps in (3, 8):
@@ -116,7 +112,6 @@ def test_energy_and_duration_count_every_inner_step(x: np.ndarray) -> None:
     assert found[8]["energy_J"] - found[3]["energy_J"] == pytest.approx(5 * cycle)
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("without_compiler")
 def test_a_plan_is_feasible_and_walks_in_the_engine(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
@@ -145,7 +140,6 @@ def test_a_plan_is_feasible_and_walks_in_the_engine(tmp_path: Path) -> None:
     assert simulated["energy_J"] == pytest.approx(data["energy_J"], rel=0.1)
 
 
-@pytest.mark.slow
 def test_the_grid_of_a_plan_is_chosen_by_its_energy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("nlp_gait.backends.plan_walk.FIRST_GRID", 2)
     plan = plan_walk("nao-v5", 3, distance_m=0.1, settings=WalkSettings(starts=1))
@@ -236,7 +230,6 @@ def test_what_cannot_be_planned_is_refused(options: dict[str, float], words: str
         plan_walk("nao-v5", **options)  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("without_compiler")
 def test_a_start_that_fails_is_tried_again_with_a_monotone_barrier(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
@@ -252,7 +245,6 @@ def test_a_start_that_fails_is_tried_again_with_a_monotone_barrier(monkeypatch: 
     assert [line.partition(":")[0] for line in said] == ["start 1, adaptive barrier", "start 1, monotone barrier"]
 
 
-@pytest.mark.slow
 def test_an_infeasible_plan_names_its_obstacles(problem: GaitProblem) -> None:
     row = ConstraintValue(name="ssp_reach[left leg, 3]", value=1.0, lower=None, upper=0.99, violation=0.01, unit="1")
     x0 = problem.start_point(np.random.default_rng(0))
@@ -274,7 +266,6 @@ def climb(tmp_path_factory: pytest.TempPathFactory) -> GaitProblem:
     return nlp_gait.load("humanoid-walk", robot=str(path), steps=3, intervals=2, stair_rise_m=0.01, stair_run_m=0.1)
 
 
-@pytest.mark.slow
 def test_every_step_climbs_one_tread_and_clears_its_edge(climb: GaitProblem) -> None:
     values = climb.by_name(climb.start_point(np.random.default_rng(0)))
     assert values["step_length_m"] == 0.1 and climb.value("swing_height_m.lower") > 0.01

@@ -194,14 +194,12 @@ ENDS = {
 converging = pytest.mark.parametrize("name", [name for name in ALL if name != "random"])
 
 
-@pytest.mark.slow
 @converging
 def test_sphere_and_rosenbrock_converge(name: str) -> None:
     for problem, end in ((sphere(1), 0), (sphere(4), 0), (rosenbrock(), 1)):
         assert minimize(problem, ALL[name](), evaluations=EVALUATIONS[name], seed=1).objective < ENDS[name][end]
 
 
-@pytest.mark.slow
 @converging
 @pytest.mark.parametrize("handling", [Deb(), EpsilonLevel()], ids=lambda h: h.name)
 def test_constrained_optimum_is_found(name: str, handling: Deb | EpsilonLevel) -> None:

@@ -66,7 +66,6 @@ def test_a_program_may_end_by_itself() -> None:
     assert ended.evaluations == 2 and ended.reasons == ("the program ended",)
 
 
-@pytest.mark.slow
 def test_a_program_may_leave_a_process_behind_that_holds_its_output() -> None:
     held = run("sh", "-c", "printf '{\"x\": [0, 1]}\\n'; read a; read a; sleep 30 & exit 0")
     assert held.evaluations == 1
@@ -113,7 +112,6 @@ def test_a_missing_program_is_named() -> None:
         run("/no/such")
 
 
-@pytest.mark.slow
 def test_the_caller_in_cpp(tmp_path: Path) -> None:
     program = tmp_path / "random_search"
     command = [*find_compiler().command, "-o", str(program), str(CALLERS / "random_search.cpp")]
@@ -121,7 +119,6 @@ def test_the_caller_in_cpp(tmp_path: Path) -> None:
     assert run(str(program)).evaluations == 50
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "caller",
     [

@@ -22,7 +22,6 @@ class TwoParabolas:
         return np.stack([x**2 + y**2, (x - 1) ** 2 + y**2], axis=1), np.maximum(0.0, 0.1 - y)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", FRONT_ALGORITHMS)
 def test_fronts_are_feasible_near_the_true_one_and_repeat_with_their_seed(name: str) -> None:
     algorithm = make_front_algorithm(name, population=20)

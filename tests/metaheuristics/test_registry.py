@@ -83,7 +83,6 @@ def test_trials_of_differential_evolution_are_those_of_scipy(strategy: str) -> N
     np.testing.assert_allclose(search.ask(), generations[1], rtol=1e-14)
 
 
-@pytest.mark.slow
 def test_cma_restarts_with_a_growing_population() -> None:
     sizes: list[int] = []
     minimize(sphere(2), CmaEs(), evaluations=6000, seed=2, callback=lambda X, f, v: sizes.append(len(X)))

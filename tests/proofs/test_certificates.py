@@ -21,13 +21,11 @@ SAME_VALUE = 1e-9  # relative; by other compilers
 PHASES = ("nao-dsp", "nao-ssp")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["walk12", *PHASES])
 def test_no_box_loses_a_feasible_point_that_is_better_than_the_target(name: str) -> None:
     assert count_lost_boxes(load(name), best_x(name), 100, np.random.default_rng(SEED)) == 0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", PHASES)
 def test_around_the_best_gait_of_a_phase_nothing_is_better_by_a_percent(name: str) -> None:
     best = best_x(name)
@@ -36,7 +34,6 @@ def test_around_the_best_gait_of_a_phase_nothing_is_better_by_a_percent(name: st
     assert proof.closed and proof.gap == pytest.approx(0.01) and proof.boxes > 10
 
 
-@pytest.mark.slow
 def test_a_least_power_form_that_differs_from_the_exact_functions_is_refused() -> None:
     problem = nlp_gait.load("nao-dsp", intervals=2)
     data = replace(problem.least_power, step_m=0.060001)

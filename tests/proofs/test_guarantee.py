@@ -145,7 +145,6 @@ def test_best_known_gaits_hold_at_all_times_and_random_ones_are_not_contradicted
     assert not against and satisfied > 0
 
 
-@pytest.mark.slow
 def test_a_stair_gait_that_breaks_a_limit_between_samples_breaks_it_by_what_the_grid_shows() -> None:
     problem, x = nlp_gait.load("stairs-plan"), best("stairs-energy")
     judged = evaluate(problem, x)
@@ -162,7 +161,6 @@ def test_a_stair_gait_that_breaks_a_limit_between_samples_breaks_it_by_what_the_
     assert low <= evaluate(problem, x).dense["energy_J"] * (1 + 1e-3) and high >= low > 0.0
 
 
-@pytest.mark.slow
 def test_a_spline_without_coefficients_holds_as_its_cubic_does_across_knots() -> None:
     problem = nlp_gait.load("nao-dsp", trajectory="spline-4")
     x = np.concatenate([best("dsp-v5"), np.zeros(len(problem.names) - len(best("dsp-v5")))])

@@ -38,7 +38,6 @@ def power_form(name: str) -> PowerForm:
     return make_power_form(problem, problem.least_power)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-dsp", "nao-ssp"])
 def test_gaits_are_enclosed_at_sampled_points_of_boxes_around_the_best(name: str) -> None:
     form, rng = power_form(name), np.random.default_rng(SEED)
@@ -108,7 +107,6 @@ def least_power(rng: np.random.Generator) -> tuple[ca.Function, PowerRows]:
     return ca.Function("least_power", [z], [outputs]), rows
 
 
-@pytest.mark.slow
 def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() -> None:
     rng, tight = np.random.default_rng(SEED), 0
     for _ in range(80):
@@ -133,7 +131,6 @@ def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() ->
     assert tight > 6  # bounds that are far off would hide an error
 
 
-@pytest.mark.slow
 def test_boxes_that_contain_the_best_gait_keep_it_and_have_bounds_that_converge_to_its_cost() -> None:
     problem, x = load("nao-ssp"), best_x("nao-ssp")
     bounds, cost = make_bounds(problem), build_exact_model(problem).at(x, problem.p).cost

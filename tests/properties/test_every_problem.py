@@ -60,7 +60,6 @@ far = (
 )
 
 
-@pytest.mark.slow
 @of_every_variant
 @settings(max_examples=20)
 @given(data=st.data())
@@ -71,7 +70,6 @@ def test_every_output_is_finite_for_every_finite_x(name: str, kind: str | None, 
     assert np.isfinite([found.cost, found.violation, *found.g, *found.indexes.values()]).all()
 
 
-@pytest.mark.slow
 @of_every_variant
 @settings(max_examples=10)
 @given(seed=st.integers(0, 2**32 - 1), outside=st.booleans())
@@ -118,7 +116,6 @@ def solve_once(name: str) -> tuple[GaitProblem, Outcome]:
     return problem, SOLVER.run(problem, problem.start_point(np.random.default_rng(0)))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVABLE)
 def test_at_an_optimum_the_lifted_objective_is_the_exact_one(name: str) -> None:
     problem, end = solve_once(name)
@@ -130,7 +127,6 @@ def test_at_an_optimum_the_lifted_objective_is_the_exact_one(name: str) -> None:
     assert end.violation <= FEASIBILITY_TOLERANCE
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVABLE)
 def test_no_start_ends_below_what_the_exact_functions_find_around_it(name: str) -> None:
     """Feasible neighbours of an optimum are not better."""
@@ -163,7 +159,6 @@ def assert_derivative(function: ca.Function, slope: ca.Function, at: Array, rest
         np.testing.assert_allclose((up - down) / (2 * DIFFERENCE_STEP), expected, rtol=0, atol=tolerance)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SMOOTH)
 def test_the_hessian_is_the_difference_of_gradients(name: str) -> None:
     """Of the Lagrangian with random multipliers."""
@@ -192,7 +187,6 @@ def test_gradient_and_jacobian_are_differences_of_values(name: str) -> None:
     assert_derivative(value, slope, at, (values,))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_every_row_and_index_has_its_own_name(name: str) -> None:
     model = build_exact_model(problem_of(name))
@@ -212,7 +206,6 @@ UNITS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_every_time_history_has_its_unit_and_is_drawn(name: str) -> None:
     problem = problem_of(name)

@@ -54,7 +54,6 @@ def larger(factor: float) -> Record:
     return raw
 
 
-@pytest.mark.slow
 @of_both_phases
 def test_masses_scale_torques_and_leave_the_balance(tmp_path: Path, name: str) -> None:
     """Mechanical power grows like the masses, heat like their square: with K / factor all power grows alike."""
@@ -72,7 +71,6 @@ def test_masses_scale_torques_and_leave_the_balance(tmp_path: Path, name: str) -
             assert after[index] == pytest.approx(before[index], rel=ROUNDING, abs=ROUNDING)
 
 
-@pytest.mark.slow
 @of_both_phases
 def test_lengths_scale_like_the_square_of_times(tmp_path: Path, name: str) -> None:
     """Froude's similarity with a robot twice as large: equal angles, lengths times 2, times and speeds times sqrt(2)."""

@@ -122,7 +122,6 @@ def in_order(X: Array) -> Array:
     return np.all(np.diff(X[:, 6:9], axis=1) > 0.05, axis=1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("length", "ratio", "agreement"), [(0.508, 0.70, AGREEMENT), (0.5588, 0.60, 1e-8)])
 def test_the_planned_step_on_stairs(length: float, ratio: float, agreement: float) -> None:
     """Energy, jerk and all rows on a stair of Table IV, and on a flatter one, which stretches its cycloid.
@@ -139,7 +138,6 @@ def test_the_planned_step_on_stairs(length: float, ratio: float, agreement: floa
     assert worst(found)[0] < agreement, worst(found)
 
 
-@pytest.mark.slow
 def test_the_regular_step_of_a_climb() -> None:
     """Effort of one more stair, and all rows of 1,560 variables: continuity, feet, shanks, and the ground's forces."""
     problem, longer = (nlp_gait.load("stairs-climb", stairs=stairs, intervals=70) for stairs in (2, 3))
@@ -153,7 +151,6 @@ def test_the_regular_step_of_a_climb() -> None:
     np.testing.assert_allclose(three - two, stairs_climb.regular_step(X, problem.names)["effort"], rtol=AGREEMENT)
 
 
-@pytest.mark.slow
 def test_reach_is_judged_alike_out_of_reach() -> None:
     """Also where the legs do not reach, and at knots out of order, what the papers still define is the same."""
     ssp, robot = nlp_gait.load("nao-ssp"), nao.robot()

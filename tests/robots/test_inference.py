@@ -113,7 +113,6 @@ def test_the_robot_file_overrides_the_urdf(tmp_path: Path) -> None:
     assert biped.heat_W_per_Nm2 == 0.001 and biped.heat_source == "from the robot's file"
 
 
-@pytest.mark.slow
 def test_a_mesh_is_needed_only_where_a_sole_comes_from_it(tmp_path: Path) -> None:
     text = crooked_urdf().replace("<box size", '<mesh filename="package://feet/sole.stl" size')
     path = crooked(tmp_path, text)

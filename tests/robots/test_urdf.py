@@ -27,7 +27,6 @@ def stored(folder: Path, tree: ElementTree.Element | str, robot: object = None) 
     return str(path)
 
 
-@pytest.mark.slow
 @settings(max_examples=25)  # each writes and reads two files
 @given(angles=st.lists(st.tuples(*[st.floats(-3.0, 3.0)] * 3), min_size=24, max_size=24))
 def test_the_axes_in_which_a_urdf_is_written_do_not_matter(

@@ -49,7 +49,6 @@ BOMBS = (
 )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("text", BOMBS)
 def test_a_model_that_takes_too_much_is_rejected(tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(meshes, "TIME_LIMIT_S", TIME_S)
@@ -78,7 +77,6 @@ CHAIN = "".join(f'<link name="a{k}"/><joint name="j{k}" type="fixed"/>' for k in
 JOINTS = '<body><joint/><geom size="1"/></body>'
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("read", "name", "text", "message"),
     [

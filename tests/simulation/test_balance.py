@@ -136,7 +136,6 @@ def test_a_foot_that_rolls_is_held_at_the_tip_of_its_toe_where_no_moment_acts() 
     np.testing.assert_allclose(rows @ data.qacc + drift @ data.qvel, 0.0, atol=0.05)  # a weighted task
 
 
-@pytest.mark.slow
 def test_a_wrench_is_allowed_just_where_forces_at_the_corners_of_a_sole_give_it(plan: Plan) -> None:
     model, _ = prepare(plan, Conditions(), Drive(), "rectangle")
     limits = find_torque_limits(plan)
@@ -191,7 +190,6 @@ def test_steps_from_rest_move_the_mass_as_a_pendulum_and_end_where_they_begin(st
     assert lifted[first, 2] > 0.01 and (np.delete(lifted, 3 * first + 2) == 0.0).all()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("impulse_Ns", "settings", "steps"), [(2.6, (1.0, 0.1), 0), (3.5, (1.0, 0.1), 1), (3.5, (0.2, 0.0), 0)]
 )
@@ -219,7 +217,6 @@ def advance(run: SimulationRun) -> Array:
     return np.array(run.data.qpos)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("impulse_Ns", "share"), [((2.1, 0.0), 0.45), ((0.0, 2.1), 0.45), ((0.0, -1.8), 0.55)])
 def test_a_pushed_walk_stands_with_it_and_falls_without(
     plan: Plan, impulse_Ns: tuple[float, float], share: float
@@ -231,7 +228,6 @@ def test_a_pushed_walk_stands_with_it_and_falls_without(
     assert alone.fell_at_s is not None and balanced.fell_at_s is None
 
 
-@pytest.mark.slow
 def test_bumps_noise_and_delay_act_and_the_same_seed_gives_the_same_walk(plan: Plan) -> None:
     settings = Balance(noise=1.0, delay_s=0.004)
     bumpy = Conditions(bumps=Bumps(height_m=0.004))
@@ -286,7 +282,6 @@ def test_the_load_passes_from_foot_to_foot(plan: Plan) -> None:
     np.testing.assert_allclose((nearest - plan.at("zmp", times)[1]) @ (feet[0] - feet[1])[1], 0.0, atol=1e-12)
 
 
-@pytest.mark.slow
 def test_the_commands_take_feedback_and_conditions(cycle: Result, tmp_path: Path) -> None:
     result = tmp_path / "cycle.json"
     result.write_text(json.dumps({"problem": "nao-cycle", "x": cycle.problem.by_name(cycle.x)}))

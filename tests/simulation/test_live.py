@@ -81,7 +81,6 @@ def open_window(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     return replace
 
 
-@pytest.mark.slow
 def test_a_watched_simulation_is_the_same(plan: Plan, open_window: Callable[..., None]) -> None:
     expected = simulate_plan(plan)
     for pictures in (10**6, 3):  # to the end, or until the window is closed
@@ -91,7 +90,6 @@ def test_a_watched_simulation_is_the_same(plan: Plan, open_window: Callable[...,
         np.testing.assert_array_equal(run.finish().states, expected.states)
 
 
-@pytest.mark.slow
 def test_arrow_keys_push_forward_and_to_the_left(plan: Plan, open_window: Callable[..., None]) -> None:
     unpushed = simulate_plan(plan)
     for key, axis in ((UP, 0), (LEFT, 1)):
@@ -115,7 +113,6 @@ def stored(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.slow
 def test_without_a_display_it_is_simulated_and_the_command_fails_with_one_sentence(
     stored: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -144,7 +141,6 @@ def display() -> Iterator[str]:
         server.terminate()
 
 
-@pytest.mark.slow
 def test_the_window_opens_on_a_display(stored: Path, display: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setenv("DISPLAY", display)

@@ -109,7 +109,6 @@ def test_gravity_is_compensated_by_the_torques_that_hold_the_posture_over_the_fo
     np.testing.assert_allclose(shift[joints], 0.5 * expected[joints] / 100.0, atol=1e-8)
 
 
-@pytest.mark.slow
 def test_a_root_on_the_ground_that_is_named_world_is_the_same_robot(tmp_path: Path) -> None:
     """As in ROS: the file's root is the ground, fixed to the base."""
     base = (

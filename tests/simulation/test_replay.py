@@ -21,7 +21,6 @@ def simulated(gait):
     return plan, simulate_plan(plan), model
 
 
-@pytest.mark.slow
 def test_frames_are_equally_long_and_states_those_of_the_torso(simulated):
     plan, trace, model = simulated
     frames = list_frames(trace)
@@ -31,7 +30,6 @@ def test_frames_are_equally_long_and_states_those_of_the_torso(simulated):
     np.testing.assert_allclose(trace.states[:, :3], trace.torso, atol=1e-12)
 
 
-@pytest.mark.slow
 def test_the_skeleton_is_where_the_engine_has_the_robot(simulated):
     skeleton = make_skeleton(*simulated, "rectangle", "a title")
     feet = simulated[1].feet[list_frames(simulated[1])]  # soles under the ankles
@@ -48,7 +46,6 @@ def test_the_skeleton_is_where_the_engine_has_the_robot(simulated):
     np.testing.assert_array_equal(skeleton.ground[:, 1], 0.0)
 
 
-@pytest.mark.slow
 def test_without_opengl_the_error_names_the_page(simulated, monkeypatch):
     def refuse(*_):
         raise RuntimeError("no context")

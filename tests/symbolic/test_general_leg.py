@@ -168,7 +168,6 @@ def test_what_is_not_a_leg_is_refused(robots: dict[str, Robot]) -> None:
             Leg(joints=leg.joints, axes=axes, points=leg.points, foot_m=leg.foot_m, limits_rad=leg.limits_rad)
 
 
-@pytest.mark.slow
 def test_a_few_poses_may_stay_open_but_not_many() -> None:
     """Right leg of Alexander (example-robot-data 6.0.0), whose hip axes pass each other by 0.16 m."""
     leg = Leg(

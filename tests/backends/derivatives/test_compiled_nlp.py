@@ -54,7 +54,6 @@ def compared(nlp: dict[str, MX], p: Array, points: Array) -> float:
     return worst
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("longest", [0, first_order.LONGEST_WRITTEN_OUT], ids=["in directions", "written out"])
 def test_chained_samples_give_the_same_values_and_derivatives(longest: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(first_order, "LONGEST_WRITTEN_OUT", longest)
@@ -63,7 +62,6 @@ def test_chained_samples_give_the_same_values_and_derivatives(longest: int, monk
     assert compared(chain(), np.array([1.1, 0.7]), points) < TOLERANCE
 
 
-@pytest.mark.slow
 def test_single_support_gives_the_same_values_and_derivatives_also_outside_the_bounds() -> None:
     problem = nlp_gait.load("nao-ssp")
     model = build_nlp(problem)

@@ -53,7 +53,6 @@ def expected(name: str) -> tuple[Array, Array, Array]:
     return np.array(cost).ravel(), np.array(violation).ravel(), np.array(g).T
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "lanes"), AGREEING)
 def test_agrees_with_the_virtual_machine(name: str, lanes: int) -> None:
     objective, X = read_objective(name, lanes), candidates(problem_named(name))

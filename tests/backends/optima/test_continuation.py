@@ -33,7 +33,6 @@ def true_depth(limit: float) -> float:
     return float(((x**2 - 1) ** 2 + limit * x).min())
 
 
-@pytest.mark.slow
 def test_one_direction_stays_in_a_well_and_both_find_the_lower_one() -> None:
     limits = np.linspace(-1.0, 1.0, 11).tolist()
     problem = toy(two_wells)

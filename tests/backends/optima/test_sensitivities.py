@@ -96,7 +96,6 @@ def test_a_flat_optimum_is_refused_with_the_reason() -> None:
         differentiate_by_parameters(at)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "parameters"),
     [
@@ -120,7 +119,6 @@ def test_slopes_are_those_of_solving_again(name: str, parameters: tuple[str, ...
         )
 
 
-@pytest.mark.slow
 def test_a_heavier_robot_by_evaluating_it_is_as_by_solving_it() -> None:
     problem = load("nao-dsp", intervals=5)
     near, at = solved(problem)

@@ -36,7 +36,6 @@ def point(solution: Solution) -> np.ndarray:
     return np.array(list(solution.x.values()))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("phase", ["single_support", "double_support"])
 def test_prices_are_what_a_changed_limit_costs(phase: str, request: pytest.FixtureRequest) -> None:
     """Each bound moved by a little, and the problem solved again from the optimum."""
@@ -55,7 +54,6 @@ def test_prices_are_what_a_changed_limit_costs(phase: str, request: pytest.Fixtu
         assert (again.objective - solution.objective) / PRICE_STEP == pytest.approx(bound.price, rel=PRICE_TOLERANCE)
 
 
-@pytest.mark.slow
 def test_a_solution_accounts_for_its_work(single_support: tuple[GaitProblem, Solution]) -> None:
     problem, solution = single_support
     counts = asdict(solution.evaluations)
@@ -150,7 +148,6 @@ def test_a_start_from_which_feasibility_is_not_restored_soon_is_moved_towards_th
     assert found.x0.tolist() == x0.tolist()
 
 
-@pytest.mark.slow
 def test_no_start_takes_many_more_iterations_than_the_others() -> None:
     solution = solve(load("nao-ssp"), starts=20, seed=0)
     iterations = [start.iterations for start in solution.starts]
@@ -184,7 +181,6 @@ def test_a_start_outside_the_bounds_is_refused_and_one_on_them_but_for_rounding_
     assert solve(problem, x0=[9.0, 0.0], fix={"x": 1.0}).starts[0].x0.tolist() == [1.0, 0.0]
 
 
-@pytest.mark.slow
 def test_widths_of_ones_own_narrow_from_stage_to_stage() -> None:
     problem = load("nao-ssp", intervals=3)
     usual, narrower = (
@@ -197,7 +193,6 @@ def test_widths_of_ones_own_narrow_from_stage_to_stage() -> None:
             IpoptSettings(widths=widths)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("margin_m", "compiled"), [(0.05, False), (0.065, True)])
 def test_the_usual_widths_end_at_the_gait_of_narrower_ones(margin_m: float, compiled: bool) -> None:
     problem = load("nao-ssp").with_values(dbm_x_mean_limit_m=margin_m)  # 0.065: samples stay at the edge of the jump

@@ -68,7 +68,6 @@ class Stuck(ca.Callback):
         return ca.Function(name, [x, y], [ca.MX(1, 1)])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("presses", [False, True])
 def test_an_iteration_of_a_large_problem_that_does_not_end_is_killed(presses: bool) -> None:
     """At the limit and a grace, or at Ctrl-C; the last iterate remains."""

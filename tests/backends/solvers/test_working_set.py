@@ -86,7 +86,6 @@ def test_a_run_that_is_ended_is_not_begun_again() -> None:
     assert np.array(found["lam_g"]).ravel().shape == (SIDES,)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("compiled", [True, False])
 def test_a_gait_has_few_rows_that_matter(compiled: bool) -> None:
     """Its start does not depend on the copy of the problem that was solved first, and no limit is broken in the end."""

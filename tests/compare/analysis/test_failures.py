@@ -42,7 +42,6 @@ def failing(monkeypatch: pytest.MonkeyPatch, calls: int) -> None:
     monkeypatch.setattr(ParticleSwarm, "start", counted)
 
 
-@pytest.mark.slow
 def test_a_solver_without_any_run_ends_a_comparison_with_status_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -60,7 +59,6 @@ def test_a_solver_without_any_run_ends_a_comparison_with_status_1(
     assert json.loads(again.stdout)["problems"]["walk12"]
 
 
-@pytest.mark.slow
 def test_a_container_whose_user_has_no_entry(tmp_path: Path) -> None:
     # The user's entry is gone for this process only; reading it fails as it does for a number without one.
     sitecustomize = tmp_path / "sitecustomize.py"

@@ -18,7 +18,6 @@ from compare.bench.leaderboard import rank_solvers
 from nlp_gait import gaitbench
 
 
-@pytest.mark.slow
 def test_everything_of_the_small_suite_is_shipped() -> None:
     """Twelve solvers, fifteen runs each with the seeds of the rules, the same budget; the table is below 300 kB."""
     assert set(gaitbench.list_instances("small")) <= set(list_baselines())
@@ -30,7 +29,6 @@ def test_everything_of_the_small_suite_is_shipped() -> None:
         assert {r.counts["f"] for r in records if r.inputs.handling} <= {*range(9_900, 10_001)}
 
 
-@pytest.mark.slow
 def test_no_shipped_run_is_better_than_the_best_known() -> None:
     """By more than a judge's tolerance of 1e-6 can buy."""
     for id in list_baselines():
@@ -40,7 +38,6 @@ def test_no_shipped_run_is_better_than_the_best_known() -> None:
         assert best >= instance.best_known - 1e-5 * abs(instance.best_known), id
 
 
-@pytest.mark.slow
 def test_places_follow_from_expected_running_times() -> None:
     """A solver that has the best one's runs at half of the cost takes the first place; its twin shares all ranks."""
     ids = ("walk12-w015", "ssp-v5")
@@ -89,7 +86,6 @@ def test_a_solver_that_finds_nothing_is_last() -> None:
     assert all(duel.wins == 0 for duel in count_wins(board.comparisons, "nothing"))
 
 
-@pytest.mark.slow
 def test_drawn_instances_have_a_baseline() -> None:
     drawn = list_baselines(drawn=True)
     assert len(drawn) >= 54 and len({id.split(":")[1] for id in drawn}) >= 9

@@ -76,7 +76,6 @@ PRINTS = "print(chr(0x202f))"
 BREAKS = "(_ for _ in ()).throw(BrokenPipeError(32, ''))"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("script", "status", "printed", "said"),
     [
@@ -101,7 +100,6 @@ def test_outputs_that_are_closed_full_or_of_another_encoding(script: str, status
     assert done.stdout.startswith(printed) and bool(done.stdout) == bool(printed)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -117,7 +115,6 @@ def test_a_name_that_is_not_text_is_refused_before_the_work(arguments: str, tmp_
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
 def test_no_room_for_temporary_files_is_one_sentence(tmp_path: Path) -> None:
     program = Path("/srv") / Path(sys.executable).relative_to(sys.prefix)
     fill = 'mount -t tmpfs -o size=4k none "$place"; head -c 4096 /dev/zero > "$place/x"; '

@@ -43,7 +43,6 @@ def test_a_time_that_runs_backwards_is_refused(tmp_path: Path) -> None:
     assert "must last 0.001 to 300 s, but it lasts -0.1 s" in one_sentence("simulate", path)
 
 
-@pytest.mark.slow
 def test_a_simulation_names_them_too(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     report = as_json("simulate", write(tmp_path / "gait.json", hip_height_m=9.0), "--feedback", "none")

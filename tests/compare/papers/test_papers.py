@@ -35,7 +35,6 @@ def quick(tmp_path_factory: pytest.TempPathFactory, coarse_pages: None) -> Quick
     return reproduce
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", REPRODUCTIONS)
 def test_a_quick_run_confirms_the_record(name: str, quick: Quick) -> None:
     paper = load_reproduction(name)
@@ -87,7 +86,6 @@ def test_a_folder_that_cannot_be_written_to_fails_before_the_work(name: str, tmp
         paper.reproduce(Runner(folder=tmp_path / "file"), paper.quick)
 
 
-@pytest.mark.slow
 def test_claims_of_the_12_joint_walk_hold_in_some_readings_only(quick: Quick) -> None:
     verdicts = quick("walk12")[1]["verdicts"]
     assert verdicts["f1-last"] == {name: "holds" if name == RAISED else "does not hold" for name in READINGS}
@@ -95,7 +93,6 @@ def test_claims_of_the_12_joint_walk_hold_in_some_readings_only(quick: Quick) ->
     assert set(verdicts["speed"].values()) == {"depends"} and set(verdicts["accuracy"].values()) == {"does not hold"}
 
 
-@pytest.mark.slow
 def test_tables_of_the_12_joint_walk_agree_with_the_records(quick: Quick) -> None:
     folder, record = quick("walk12")
     records = folder / "records"

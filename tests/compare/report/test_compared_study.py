@@ -17,7 +17,6 @@ def study() -> ComparedStudy:
 
 
 @pytest.mark.commit
-@pytest.mark.slow
 def test_one_call_compares_searches_with_ipopt(study: ComparedStudy, tmp_path: Path) -> None:
     assert [len(comparison.solvers) for comparison in study.comparisons] == [3, 3]
     assert str(study).startswith("nao-dsp: The median ") and "above the proven optimum of 0.531886 W" in str(study)
@@ -30,7 +29,6 @@ def test_one_call_compares_searches_with_ipopt(study: ComparedStudy, tmp_path: P
         study.table("nao-dps")
 
 
-@pytest.mark.slow
 def test_tables_for_papers_show_different_digits_gaps_and_marks(study: ComparedStudy) -> None:
     text = study.latex()
     assert text.count(r"\begin{tabular}") == 3 and r"64 \%" in text

@@ -168,7 +168,6 @@ def test_page_loads_nothing(page: str, tables: Tables) -> None:
     assert len(ids) == len(set(ids))
 
 
-@pytest.mark.slow
 def test_a_damaged_record_is_named_and_left_out(tmp_path: Path, coarse_pictures: None) -> None:
     write_record(judged("pso", FAST_X), tmp_path)
     write_record(judged("pso", FAST_X, run=1), tmp_path).write_text("{")

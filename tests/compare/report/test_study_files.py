@@ -72,7 +72,6 @@ def test_runs_csv_is_written_again_where_it_exists(records: list[RunRecord], tmp
     assert (tmp_path / "runs.csv").read_text().startswith("problem,solver,run,")
 
 
-@pytest.mark.slow
 def test_all_figures_are_written_for_papers_with_embedded_fonts(records: list[RunRecord], tmp_path: Path) -> None:
     comparisons = compare_problems(records)
     document = make_study_document(comparisons, StudyFile())
@@ -85,7 +84,6 @@ def test_all_figures_are_written_for_papers_with_embedded_fonts(records: list[Ru
     assert text.count("walk12, 6 runs of each solver, at most 1,000 evaluations") == 5
 
 
-@pytest.mark.slow
 @pytest.mark.program("pdflatex")
 def test_latex_reads_it(records: list[RunRecord], tmp_path: Path) -> None:
     document = make_study_document(compare_problems(records), StudyFile())

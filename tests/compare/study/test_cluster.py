@@ -69,7 +69,6 @@ def search(evaluate, lower, upper, evaluations, seed):
 
 
 @pytest.mark.commit
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of Dask's own clean-up
 def test_workers_find_user_code_and_killed_processes_lose_no_run(
     cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -107,7 +106,6 @@ def test_workers_find_user_code_and_killed_processes_lose_no_run(
     assert 0 < len(finished) == len(list((tmp_path / "lost" / "records").rglob("*.json"))) < len(more.make_runs())
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_no_scheduler_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.study.study.CONNECT_TIMEOUT", "1s")

@@ -12,7 +12,6 @@ SSP = ProblemSpec(name="nao-ssp")
 OPTIMUM = 0.845868
 
 
-@pytest.mark.slow
 def test_slsqp_finds_the_optimum_and_counts_every_finite_difference() -> None:
     record = run_once(Run(problem=SSP, solver="slsqp"))
     assert record.reported_feasible and record.feasible
@@ -21,7 +20,6 @@ def test_slsqp_finds_the_optimum_and_counts_every_finite_difference() -> None:
     assert (np.diff(record.history.evaluations) > 0).all() and (np.diff(record.time_s.history) > 0.0).all()
 
 
-@pytest.mark.slow
 def test_slsqp_keeps_its_best_point_within_the_budget() -> None:
     record = run_once(Run(problem=SSP, solver="slsqp", stop=Stop(evaluations=45)))
     assert record.status == "evaluation budget used" and not record.reported_feasible

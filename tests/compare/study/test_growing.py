@@ -78,7 +78,6 @@ def test_a_gradient_run_depends_only_on_what_it_heeds() -> None:
     assert find("slsqp", evaluations=300) != find("slsqp", evaluations=400)
 
 
-@pytest.mark.slow
 def test_a_robot_is_its_content_wherever_its_file_lies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, without_compiler: None
 ) -> None:

@@ -84,7 +84,6 @@ def test_a_damaged_file_is_refused_by_its_line(text: str, message: str, tmp_path
         read_points(tmp_path / "x.csv", PROBLEM)
 
 
-@pytest.mark.slow
 def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_path: Path) -> None:
     out = tmp_path / "study"
     extra: dict[str, list[object]] = {"evaluations": [100, "", ""], "time_s": ["", 2.0, ""]}

@@ -64,7 +64,6 @@ def fail(error: BaseException) -> RunRecord:
     raise error
 
 
-@pytest.mark.slow
 def test_no_result_of_a_run_makes_a_record_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.study.record.LARGEST_FILE", 2**20)
     sound = judged("random", dict.fromkeys(RUN.problem.load().names, 0.1), problem="walk12")

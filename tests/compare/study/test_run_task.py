@@ -82,7 +82,6 @@ def written(folder: Path, name: str, way: str) -> Path:
     return path
 
 
-@pytest.mark.slow
 def test_many_hostile_plug_ins_leave_the_others_records_whole(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -108,7 +107,6 @@ def test_many_hostile_plug_ins_leave_the_others_records_whole(
         ), (ways[record.solver], record.status)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "body", "said"),
     [

@@ -57,7 +57,6 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
 def test_each_run_has_one_file_named_after_its_inputs(undisturbed: Path) -> None:
     names = [f"walk12/{solver}-000{run}" for solver in ("ga", "pso", "pso+ipopt", "pso-20") for run in (0, 1)]
     runs = read_study_file(undisturbed).runs
@@ -65,7 +64,6 @@ def test_each_run_has_one_file_named_after_its_inputs(undisturbed: Path) -> None
     assert sorted(name.rpartition("-")[0] for name in runs) == sorted(names)
 
 
-@pytest.mark.slow
 def test_many_workers_give_the_same_files(undisturbed: Path, tmp_path: Path) -> None:
     run_study(Study(runs=SMALL.make_runs(), folder=tmp_path, jobs=2))
     assert contents(tmp_path) == contents(undisturbed)
@@ -101,7 +99,6 @@ def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
             run_study(Study(runs=(run,), folder=tmp_path))
 
 
-@pytest.mark.slow
 def test_killed_at_a_random_moment_and_resumed_it_ends_as_undisturbed(undisturbed: Path, tmp_path: Path) -> None:
     program = (
         "import sys; from pathlib import Path; from tests.compare.study.test_study import SMALL, Study, run_study\n"
@@ -144,7 +141,6 @@ class Broken:
         return ()
 
 
-@pytest.mark.slow
 def test_a_run_that_raises_is_a_record_with_the_reason(tmp_path: Path) -> None:
     tasks = (Run(problem=SSP, solver=Broken()), Run(problem=SSP, solver="pso", stop=Stop(evaluations=100)))
     broken, good = run_study(Study(runs=tasks, folder=tmp_path))
@@ -164,7 +160,6 @@ def test_polishing_a_failed_run_is_a_failure_too(tmp_path: Path) -> None:
         assert reason in polished.status and not polished.x and polished.inputs.polish
 
 
-@pytest.mark.slow
 def test_a_run_that_takes_its_process_with_it_is_failed_and_the_others_are_complete(tmp_path: Path) -> None:
     light = ProblemSpec(name="walk12")
     runs = tuple(Run(problem=light, solver=Broken(deadly=True), label=f"deadly-{k}") for k in range(2))

@@ -157,7 +157,6 @@ def test_an_archive_with_a_program_and_code_is_verified_in_another_folder(
     assert "is not that of the record" in describe(verify_study(elsewhere / "unpacked", run_code=True))
 
 
-@pytest.mark.slow
 def test_a_packed_robot_stands_for_the_authors_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     robot = tmp_path / "robots" / "my.json"
     robot.parent.mkdir()

@@ -51,7 +51,6 @@ def reachable(problem: GaitProblem, count: int) -> Array:
     return np.array(found)
 
 
-@pytest.mark.slow
 def test_torques_and_zmp_are_pinocchios(problem: GaitProblem) -> None:
     model = problem.display.simulation_model
     assert model is not None
@@ -70,7 +69,6 @@ def test_torques_and_zmp_are_pinocchios(problem: GaitProblem) -> None:
             np.testing.assert_allclose(arrays["hip"][k], found.torso, rtol=0, atol=ZMP_TOLERANCE_M)
 
 
-@pytest.mark.slow
 def test_an_optimum_is_exact_closed_and_the_lifted_problems(problem: GaitProblem, solution: Solution) -> None:
     assert solution.converged and solution.best.violation == 0.0
     x = np.array(list(solution.x.values()))
@@ -85,7 +83,6 @@ def test_an_optimum_is_exact_closed_and_the_lifted_problems(problem: GaitProblem
     assert float(cost) == pytest.approx(exact.cost, rel=1e-6)
 
 
-@pytest.mark.slow
 def test_the_torso_leans_as_its_attitude_says(problem: GaitProblem, solution: Solution) -> None:
     signals = problem.signals(solution.x)
     w, x, y, z = signals.arrays["attitude"][0]
@@ -106,7 +103,6 @@ def test_sizes_follow_the_robot_and_nao_keeps_its_own(path: str, name: str) -> N
     assert other.value("torque_change_limit_Nm") > 1.2 * biped_scale
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_every_problem_has_finite_values_a_skeleton_and_a_mirror_image(path: str, name: str) -> None:
     problem = load(name, robot=path, intervals=2)
@@ -122,7 +118,6 @@ def test_every_problem_has_finite_values_a_skeleton_and_a_mirror_image(path: str
         np.testing.assert_allclose(limb.points[0, 0], signals.arrays["hip"][0], atol=1e-9)
 
 
-@pytest.mark.slow
 def test_steps_of_another_length_and_motions_of_more_coefficients(path: str) -> None:
     longer = load("humanoid-ssp", robot=path, step_length_m=0.15, trajectory="spline-2", samples_per_interval=1)
     arrays = longer.signals((longer.lower + longer.upper) / 2).arrays
@@ -132,7 +127,6 @@ def test_steps_of_another_length_and_motions_of_more_coefficients(path: str) -> 
         load("humanoid-ssp", robot=path, step_length_m=-0.1)
 
 
-@pytest.mark.slow
 def test_the_step_is_simulated_upright_and_exported(problem: GaitProblem, solution: Solution, tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     from nlp_gait.export.formats import write_as

@@ -43,7 +43,6 @@ def some(problem: GaitProblem, seed: int = 0) -> Array:
     return units * np.random.default_rng(seed).normal(size=len(units))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("order", ["quintic", "spline-4"])
 def test_without_coefficients_the_motion_is_the_papers(name: str, order: str) -> None:
@@ -78,7 +77,6 @@ def test_starts_are_drawn_around_the_middle_of_the_bounds(name: str) -> None:
     assert (starts.mean(axis=0) - shifted.lower) / span == pytest.approx(np.full(len(span), 0.5), abs=0.1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_each_order_contains_the_one_before(name: str) -> None:
     coarse, fine = (load(name, trajectory=order, samples_per_interval=2) for order in ("spline-2", "spline-4"))
@@ -89,7 +87,6 @@ def test_each_order_contains_the_one_before(name: str) -> None:
     assert same[0] == pytest.approx(same[1], rel=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_ends_stay(name: str) -> None:
     problem = load(name, trajectory="spline-2").dense(100)
@@ -101,7 +98,6 @@ def test_ends_stay(name: str) -> None:
     assert np.abs(moved["hip"] - paper["hip"]).max() > 1e-3
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("curve", "value", "row"),
     [
@@ -119,7 +115,6 @@ def test_what_only_a_spline_can_break_is_a_limit(curve: str, value: float, row: 
     assert any(found.name.startswith(row) for found in row_violations(problem, x))
 
 
-@pytest.mark.slow
 def test_least_jerk_has_less_jerk_and_more_power_than_least_power() -> None:
     power, jerk = (load("nao-dsp", objective=name, intervals=5) for name in ("power", "jerk"))
     assert (jerk.objective.name, jerk.objective.unit) == ("joint_jerk", "rad^2/s^6")
@@ -131,7 +126,6 @@ def test_least_jerk_has_less_jerk_and_more_power_than_least_power() -> None:
     assert at[1]["power_W"] > 1.01 * at[0]["power_W"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "signal"), [("jerk", "qdd"), ("torque-smoothness", "tau")])
 def test_smoothness_is_the_mean_square_of_differences_of_signals(name: str, signal: str) -> None:
     problem = load("nao-ssp", objective=name)

@@ -36,7 +36,6 @@ def gaits(path: str) -> dict[str, tuple[GaitProblem, Solution]]:
     return {name: (problem, solve(problem, starts=2, solver=SOLVER)) for name, problem in problems.items()}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_another_humanoid_is_solved_without_any_setting(
     gaits: dict[str, tuple[GaitProblem, Solution]], name: str
@@ -47,7 +46,6 @@ def test_another_humanoid_is_solved_without_any_setting(
     assert solution.starts[0].objective == pytest.approx(solution.starts[1].objective, rel=5e-4)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_its_feet_stand_below_its_hip_joints_and_its_torso_where_planned(
     gaits: dict[str, tuple[GaitProblem, Solution]], path: str, name: str
@@ -78,7 +76,6 @@ def test_what_depends_on_the_robot_follows_from_its_file(path: str) -> None:
     assert measure_leg(load_robot(path), "R") == LegGeometry((0.0, -HIP_OFFSET, -0.085), THIGH, TIBIA, 0.04519)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_steps_may_be_longer(name: str) -> None:
     problem = load(name, step_length_m=0.08)
@@ -174,7 +171,6 @@ def test_a_robot_that_lacks_a_joint_is_answered_with_its_name(tmp_path: Path) ->
         load("nao-ssp", robot=written(tmp_path, text))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_feet_of_unequal_height_both_reach_the_ground(tmp_path: Path, name: str) -> None:
     raw = nao()

@@ -90,14 +90,12 @@ def mirrored_row(signals: Signals, name: str, row: int) -> Array:
     return np.array([mirror_sign(robot, *pair) * values[columns[pair[1]]] for pair in partners.items()])
 
 
-@pytest.mark.slow
 def test_positions_and_velocities_are_continuous_at_touch_down(sampled: list[Sampled]) -> None:
     for _, single, double in sampled:
         for name in ("q", "qd", "hip", "com", "left_foot", "right_foot"):
             np.testing.assert_allclose(double.arrays[name][0], single.arrays[name][-1], rtol=0, atol=CONTINUITY)
 
 
-@pytest.mark.slow
 def test_the_end_is_the_mirror_image_of_the_beginning_a_step_further(
     at_speed: GaitProblem, sampled: list[Sampled]
 ) -> None:
@@ -110,7 +108,6 @@ def test_the_end_is_the_mirror_image_of_the_beginning_a_step_further(
             np.testing.assert_allclose(double.arrays[end][-1], image, rtol=0, atol=CONTINUITY)
 
 
-@pytest.mark.slow
 def test_torques_and_zmp_of_single_support_are_pinocchios(sampled: list[Sampled]) -> None:
     robot = load_robot("nao-v5")
     model, ankle = floating_model(robot), np.array([0.0, 0.05, robot.feet["left"].ankle_height_m])
@@ -118,7 +115,6 @@ def test_torques_and_zmp_of_single_support_are_pinocchios(sampled: list[Sampled]
         check_standing(single, model, ankle, range(11))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["printed", "lever"])
 def test_torques_and_zmp_of_double_support_are_pinocchios_halves(rule: str) -> None:
     problem, robot = load("nao-cycle", torso_share=rule), load_robot("nao-v5")
@@ -127,7 +123,6 @@ def test_torques_and_zmp_of_double_support_are_pinocchios_halves(rule: str) -> N
         check_halves(double, robot, rule, 0.0, x[problem.variable_index("step_length_m")])
 
 
-@pytest.mark.slow
 def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampled: list[Sampled]) -> None:
     free = load("nao-cycle")
     for x, *halves in sampled:
@@ -147,7 +142,6 @@ def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampl
         assert figures["cost_of_transport"] == pytest.approx(power / (weight * 0.03), rel=ROUNDING)
 
 
-@pytest.mark.slow
 def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: list[Sampled]) -> None:
     x, single, double = sampled[0]
     figures = evaluated(at_speed, x).indexes

@@ -29,7 +29,6 @@ def test_every_index_of_a_verified_gait(row: dict[str, Any]) -> None:
     assert list(got.values()) == pytest.approx(row["values"], rel=0, abs=GOLDEN_TOLERANCE)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("optimum", GOLDEN["optima"], ids=[row["label"] for row in GOLDEN["optima"]])
 def test_ipopt_finds_the_optimum_from_a_random_start(optimum: dict[str, Any]) -> None:
     solution = solve(load(optimum["problem"], **optimum["options"]), starts=1, seed=1)
@@ -47,7 +46,6 @@ def test_only_single_support_smooths_its_jump(name: str) -> None:
     assert build_nlp(load(name)).smoothed == (name == "nao-ssp")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_denser_grid_shows_the_same_gait(name: str) -> None:
     x = next(row["x"] for row in GOLDEN["rows"] if row["problem"] == name)

@@ -21,7 +21,6 @@ def mean(samples: np.ndarray) -> np.ndarray:
     return trapezoid(samples, axis=0) / (len(samples) - 1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "features"),
     [
@@ -83,7 +82,6 @@ def test_a_robot_whose_rotors_are_unknown_is_refused(tmp_path: Path) -> None:
         load("nao-ssp", robot=str(path), motors="rotor")
 
 
-@pytest.mark.slow
 def test_a_cycle_pays_for_its_rotors_and_real_motors() -> None:
     """Energy of the cycle from its time histories: with free braking and rotors, phase by phase."""
     problem = load("nao-cycle", motors="rotor,free-braking", intervals=4)

@@ -51,7 +51,6 @@ def judged(gait: RecordedGait) -> Evaluation:
     return evaluate(gait.problem, np.array(gait.x), prove=False)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp", "nao-cycle"])
 def test_a_planned_gait_that_is_read_back_gets_the_same_verdict(name: str, tmp_path: Path) -> None:
     gait = make_recorded_gait(read_joint_angles(written(tmp_path, name, 1 if name == "nao-cycle" else 10), ROBOT))
@@ -66,7 +65,6 @@ def test_a_planned_gait_that_is_read_back_gets_the_same_verdict(name: str, tmp_p
             assert rows[row.name] == pytest.approx(row.value, rel=share, abs=share), row.name
 
 
-@pytest.mark.slow
 def test_its_own_limits_are_found_broken(tmp_path: Path) -> None:
     """Faster and lower than the phase allows: its time, the hip's velocities and height, and the swing height."""
     problem = load("nao-ssp")
@@ -85,7 +83,6 @@ def angles_of(path: Path) -> JointAngles:
     return read_joint_angles(path, ROBOT)
 
 
-@pytest.mark.slow
 def test_a_motion_on_the_right_foot_is_its_mirror_image(tmp_path: Path) -> None:
     angles = angles_of(written(tmp_path, "nao-ssp"))
     columns = [angles.joints.index(find_partner(name)) for name in angles.joints]
@@ -96,7 +93,6 @@ def test_a_motion_on_the_right_foot_is_its_mirror_image(tmp_path: Path) -> None:
     assert judged(gait).indexes["power_W"] == pytest.approx(judged(straight).indexes["power_W"], rel=1e-9)
 
 
-@pytest.mark.slow
 def test_torques_of_a_leaning_motion_are_pinocchios() -> None:
     """Every joint moves, the torso leans; nothing of it is planned."""
     rng, t = np.random.default_rng(3), np.linspace(0.0, 1.2, 60)
@@ -119,7 +115,6 @@ def angles_of_stance() -> np.ndarray:
     return np.asarray(standing.arrays["q"][0][[standing.joints.index(name) for name in JOINTS]])
 
 
-@pytest.mark.slow
 def test_rates_are_those_of_finite_differences(tmp_path: Path) -> None:
     """The hip's velocity comes from the joints' rates through the chain of links."""
     gait = make_recorded_gait(angles_of(written(tmp_path, "nao-ssp")))
@@ -178,7 +173,6 @@ def test_a_gait_that_it_is_not_is_refused(tmp_path: Path) -> None:
         make_recorded_gait(infinite)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("error", ["rounded", "noisy"])
 def test_phases_and_power_survive_rounding_and_noise(error: str, tmp_path: Path) -> None:
     """Three decimals or noise of 0.5 mrad; without smoothing they change the power by 21 % and 145 %."""

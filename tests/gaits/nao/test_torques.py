@@ -30,7 +30,6 @@ def motions(problem: GaitProblem) -> list[Array]:
     ]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["nao-v5", "nao-v6"])
 def test_single_support_equals_a_floating_base_model_with_the_foot_held(robot: str) -> None:
     problem, data = load("nao-ssp", robot=robot), load_robot(robot)
@@ -58,7 +57,6 @@ def test_rotors_add_what_pinocchios_armature_adds(robot: str) -> None:
     assert np.abs(signals.arrays["tau"] - without.arrays["tau"]).max() > 0.05
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["printed", "lever"])
 def test_double_support_equals_two_floating_halves_each_on_its_foot(rule: str) -> None:
     problem, data = load("nao-dsp", torso_share=rule), load_robot("nao-v5")
@@ -66,7 +64,6 @@ def test_double_support_equals_two_floating_halves_each_on_its_foot(rule: str) -
         check_halves(problem.signals(x), data, rule, 0.06, 0.12)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
 def test_separate_arms_load_no_leg_and_move_on_a_torso_at_rest(name: str, tmp_path: Path) -> None:
     """The legs' torques are those of a robot with arms of a milligram; the arms' are those of arms that a still torso carries."""

@@ -60,7 +60,6 @@ def test_limits_and_scales_of_rows(problem: GaitProblem) -> None:
     assert zmp == pytest.approx((0.01, load_toe_foot_biped().foot_m - 0.01))
 
 
-@pytest.mark.slow
 def test_optimum_is_known_and_feasible_on_the_dense_grid(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
     assert solution.converged, solution.status
     assert solution.objective == pytest.approx(BEST_ENERGY_J, rel=1e-4)
@@ -71,7 +70,6 @@ def test_optimum_is_known_and_feasible_on_the_dense_grid(problem: GaitProblem, s
     assert judged.dense["energy_J"] == pytest.approx(solution.objective, rel=0.01)
 
 
-@pytest.mark.slow
 def test_an_impossible_stair_names_what_forbids_it(problem: GaitProblem) -> None:
     steep = problem.with_values(stair_length_m=0.508, rise_run_ratio=0.5 / 0.254)
     refused = nlp_gait.solve(steep, x0=NEAR_BEST, solver=replace(SOLVER, iterations=15))

@@ -45,7 +45,6 @@ def test_doing_nothing_is_rejected_by_the_tolerance(problem: GaitProblem) -> Non
     assert indexes["largest_error_rad"] > 1.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_finite_at_every_gain(problem: GaitProblem, share: float) -> None:
     """However little holds the robot up; what falls undamped costs more than any robot could spend, and is infeasible."""
@@ -71,7 +70,6 @@ def test_the_zmp_limits_are_constraints(problem: GaitProblem) -> None:
     assert worthless - 100.0 * indexes["zmp_margin_min_m"] == pytest.approx(cost)
 
 
-@pytest.mark.slow
 def test_joint_torques_and_angles_of_the_same_motion() -> None:
     """Stiff gains give the same motion in both coordinates; there joint torques do the work of the printed ones."""
     joint, printed = (
@@ -88,7 +86,6 @@ def test_joint_torques_and_angles_of_the_same_motion() -> None:
     assert power[0] == pytest.approx(power[1], abs=0.5)
 
 
-@pytest.mark.slow
 def test_a_held_hip_is_followed_by_soft_legs_without_compensation() -> None:
     """The paper's base and six contacts: the stance leg carries nothing, and gains like those of Table IV follow."""
     held, standing = (
@@ -114,7 +111,6 @@ def test_the_printed_zmp_has_no_spin_and_one_slope(problem: GaitProblem) -> None
     assert 1e-4 < np.abs(spin - ours["zmp"]).max() < 0.1
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("without_compiler")
 def test_multiple_shooting_meets_the_ants() -> None:
     """On the first 0.04 s, which solve in a second."""
@@ -126,7 +122,6 @@ def test_multiple_shooting_meets_the_ants() -> None:
     assert found.objective == pytest.approx(solution.objective, rel=AGREEMENT)
 
 
-@pytest.mark.slow
 def test_the_network_in_place_of_the_closed_form(problem: GaitProblem) -> None:
     learned, x = nlp_gait.load("stairs-track", inverse_kinematics="network"), [100.0, 100.0, 1.45]
     (cost, *_), (known, *_) = values(learned, x), values(problem, x)

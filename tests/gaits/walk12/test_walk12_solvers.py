@@ -18,7 +18,6 @@ F1MAX = 470.7
 PROBLEM = nlp_gait.load("walk12")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("row", TABLE_3[1::2], ids=lambda row: f"lambda={row[0]}")
 def test_ipopt_from_random_starts(row: tuple[float, ...]) -> None:
     """Every other row; the reproduction of the paper solves all of them."""
@@ -31,7 +30,6 @@ def test_ipopt_from_random_starts(row: tuple[float, ...]) -> None:
     assert np.median([start.iterations for start in solution.starts]) < START_ITERATIONS
 
 
-@pytest.mark.slow
 def test_largest_f1_of_the_model() -> None:
     """Whatever the normalisation that the problem carries."""
     for f1max in (PROBLEM.value("f1max"), 300.0):
