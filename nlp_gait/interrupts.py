@@ -46,7 +46,12 @@ def raise_interrupts() -> Iterator[None]:
     """Let Ctrl-C raise KeyboardInterrupt inside, where ``exit_on_interrupt`` was called before."""
     exits = signal.getsignal(signal.SIGINT) is _exit
     with _handle_interrupts(signal.default_int_handler) if exits else nullcontext():
-        yield
+        try:
+            yield
+        finally:
+            # Where Ctrl-C came within exec(), as in the definition of a data class, Python ends by the signal, whatever the
+            # status. This resets it.
+            exec("")  # noqa: S102
 
 
 @contextmanager

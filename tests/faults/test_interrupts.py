@@ -165,3 +165,24 @@ def test_while_modules_are_imported(module: str) -> None:
     assert done.returncode == 130, done.stderr
     assert done.stderr.startswith("nlp-gait: interrupted") and done.stderr.count("\n") == 1
     assert done.stdout == ""
+
+
+PRESSED_WITHIN_EXEC = """
+import sys
+from nlp_gait.interrupts import exit_on_interrupt, raise_interrupts
+
+exit_on_interrupt()
+try:
+    with raise_interrupts():
+        exec("import signal; signal.raise_signal(signal.SIGINT)")
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+
+
+def test_within_exec_the_status_is_the_same(tmp_path: Path) -> None:
+    """Python ends by the signal there if a module runs by ``python -m``, as the command line does here."""
+    (tmp_path / "pressed.py").write_text(PRESSED_WITHIN_EXEC, encoding="utf-8")
+    path = os.pathsep.join([str(tmp_path), str(ROOT)])
+    done = subprocess.run([sys.executable, "-m", "pressed"], env={**os.environ, "PYTHONPATH": path}, timeout=60)
+    assert done.returncode == 130
