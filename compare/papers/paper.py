@@ -242,7 +242,7 @@ class Paper(Generic[E, R]):
             if one.verdict is Ruling.HOLDS:
                 holding.append(claim)
             elif one.verdict in (Ruling.FAILS, Ruling.SIZE_DIFFERS):
-                failing.append(claim + " (only the direction does)" * (one.verdict is Ruling.SIZE_DIFFERS))
+                failing.append(claim + " (its direction holds)" * (one.verdict is Ruling.SIZE_DIFFERS))
             else:
                 on = f" {one.here.partition(':')[0]}" if one.verdict is Ruling.DEPENDS else ""
                 open_by_cause.setdefault(f"{one.verdict}{on}", []).append(claim)

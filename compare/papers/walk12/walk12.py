@@ -127,7 +127,7 @@ def list_zmp_errors(zmp: str) -> list[float]:
 def list_speeds() -> Alternatives:
     """Return the speeds of the printed gaits of lambda = 0.15, 0.1 and 1 by both step times of section 7 [m/s]."""
     lengths = [row.s for row in (SECOND_ROW, SMALL, LAST)]
-    return Alternatives("the time of a step", {f"{T:g} s": [s / T for s in lengths] for T in (1.0, MEASURED_STEP_S)})
+    return Alternatives("the step time", {f"{T:g} s": [s / T for s in lengths] for T in (1.0, MEASURED_STEP_S)})
 
 
 def measure_circle() -> float:

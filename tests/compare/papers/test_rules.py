@@ -86,9 +86,7 @@ def test_excluded_readings_decide_nothing_and_others_only_if_they_vary_a_choice(
     row = {"as printed": holds, free: fails}
     assert paper.combine(row, {}) == holds
     assert paper.combine(row, {"as printed": "misses"}) == fails
-    assert paper.combine({**row, varied: fails}, {}).here.startswith(
-        "on the height of the ankle: as printed: holds (1)"
-    )
+    assert paper.combine({**row, varied: fails}, {}).here.startswith("on the ankle's height: as printed: holds (1)")
 
 
 def test_an_id_on_one_side_only_is_refused() -> None:
