@@ -12,10 +12,8 @@ Source:
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -27,7 +25,7 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.proofs.bounds import Bounds, make_bounds
 from nlp_gait.proofs.boxes import halve
-from nlp_gait.proofs.checkpoint import Tree, read_checkpoint, write_checkpoint
+from nlp_gait.proofs.checkpoint import PROVER, Tree, read_checkpoint, write_checkpoint
 
 # Number of boxes that are halved together, at least: this, or one in SHARE of the open ones, so that sorting costs little.
 BATCH, SHARE = 1024, 8
@@ -74,12 +72,11 @@ def certify(
         tolerance: relative distance of bound and objective at which to stop.
         time_limit_s: wall time after which the bound so far is returned [s].
         progress: receives the number of boxes, the bound in the problem's sense, and the share of the tree that is left.
-        checkpoint: file with the open boxes, written every half minute and at the end; a killed proof continues from it. A
-            proof starts again, and reports it, if another version of the prover made the file.
+        checkpoint: file with the open boxes, written every half minute and at the end; a killed proof continues from it.
 
     Raises:
         InputError: the incumbent is not feasible, tolerance or time limit are not positive, or the checkpoint is damaged or
-            belongs to another problem, incumbent or tolerance.
+            belongs to another problem, incumbent, tolerance or version of the prover.
         CompilerError: there is no compiler, or it fails.
     """
     if not (0.0 < tolerance < 1.0 and time_limit_s > 0.0):
@@ -89,10 +86,12 @@ def certify(
     cost = _evaluate_feasible(problem, x)
     started, used = time.perf_counter(), time.process_time()
     bounds, target = make_bounds(problem), target_cost(cost, tolerance)
-    identity = identify_problem(problem)
-    proof = hash_json({**make_key(identity), "x": x.tolist(), "tolerance": tolerance, "root": bounds.root.tolist()})
-    stored = None if checkpoint is None else _read_stored(checkpoint, identity, proof, bounds.root, progress)
-    tree = stored or _plant_tree(bounds, target)
+    key = make_key(identify_problem(problem))
+    proof = hash_json({**key, "x": x.tolist(), "tolerance": tolerance, "prover": PROVER})
+    if checkpoint is not None and checkpoint.exists():
+        tree = read_checkpoint(checkpoint, proof, bounds.root.shape[1])
+    else:
+        tree = _plant_tree(bounds, target)
     saved, deadline = started, started + time_limit_s
     started, used = started - tree.time_s, used - tree.cpu_s  # of earlier runs
     while len(tree.lowest) and time.perf_counter() < deadline:
@@ -104,10 +103,10 @@ def certify(
         if checkpoint is not None and time.perf_counter() - saved > CHECKPOINT_S:
             saved = time.perf_counter()
             tree.time_s, tree.cpu_s = saved - started, time.process_time() - used
-            write_checkpoint(checkpoint, identity, proof, tree)
+            write_checkpoint(checkpoint, proof, tree)
     tree.time_s, tree.cpu_s = time.perf_counter() - started, time.process_time() - used
     if checkpoint is not None:
-        write_checkpoint(checkpoint, identity, proof, tree)
+        write_checkpoint(checkpoint, proof, tree)
     return Certificate(
         objective=sign * cost,
         bound=sign * tree.find_bound(target),
@@ -131,18 +130,6 @@ def _evaluate_feasible(problem: GaitProblem, x: Array) -> float:
     if not exact.violation <= FEASIBILITY_TOLERANCE:
         raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {exact.violation:.3g}")
     return exact.cost
-
-
-def _read_stored(
-    checkpoint: Path, identity: Mapping[str, Any], proof: str, root: Array, progress: Progress
-) -> Tree | None:
-    if not checkpoint.exists():
-        return None
-    tree = read_checkpoint(checkpoint, identity, proof, root)
-    if tree is None:
-        name = f"checkpoint {str(checkpoint)!r}"
-        progress(f"{name} was made by another version of the prover; the proof starts again")
-    return tree
 
 
 def _plant_tree(bounds: Bounds, target: float) -> Tree:

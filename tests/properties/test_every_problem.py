@@ -101,14 +101,6 @@ def relaxed(problem: GaitProblem) -> GaitProblem:
     return problem.with_values(**wide)
 
 
-@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp", "walk12"])
-def test_the_test_above_sees_feasible_and_infeasible_candidates(name: str) -> None:
-    problem, rng = problem_of(name), np.random.default_rng(0)
-    points = [rng.uniform(problem.lower, problem.upper) for _ in range(200)]
-    feasible = [evaluated(candidate, x).violation == 0.0 for candidate in (problem, relaxed(problem)) for x in points]
-    assert {True, False} == set(feasible)
-
-
 @cache
 def solve_once(name: str) -> tuple[GaitProblem, Outcome]:
     """On a coarse grid where there is a choice, from one start, with all rows at once, without second derivatives."""

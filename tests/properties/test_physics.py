@@ -1,14 +1,10 @@
 """Invariances that any correct model of a walking robot has, whatever its numbers."""
 
-import copy
 import math
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from tests.evaluation import evaluated
@@ -101,39 +97,3 @@ def test_at_rest_the_zmp_lies_under_the_centre_of_mass(name: str, options: dict[
         np.testing.assert_allclose(arrays["zmp"], arrays["com"][:, :2], rtol=0, atol=AT_REST_M)
         fast = signals_of(problem, x)
         assert np.abs(fast["zmp"] - fast["com"][:, :2]).max() > 1e-3  # what is equal above differs in motion
-
-
-def test_at_rest_the_zmp_of_the_point_mass_biped_lies_under_its_centre_of_mass() -> None:
-    problem = load("walk12").with_values(step_time_s=SLOW_S)
-    for x in candidates(problem):
-        arrays = signals_of(problem, x)
-        np.testing.assert_allclose(arrays["zmp"], arrays["com"][:, :2], rtol=0, atol=AT_REST_M)
-
-
-@cache
-def phase(name: str) -> GaitProblem:
-    return load(name)
-
-
-@of_both_phases
-@settings(max_examples=50)
-@given(data=st.data(), heat=st.sampled_from([0.0, 0.025]))
-def test_power_is_never_negative(name: str, data: st.DataObject, heat: float) -> None:
-    """Motors do not give back what they brake."""
-    problem = phase(name).with_values(heat_loss_W_per_Nm2=heat)
-    n = len(problem.names)
-    x = np.array(data.draw(st.lists(st.floats(-1e6, 1e6) | st.floats(-1.0, 1.0), min_size=n, max_size=n)))
-    assert evaluated(problem, x).indexes["power_W"] >= 0.0
-
-
-@of_both_phases
-def test_power_without_heat_is_that_of_the_moving_joints_alone(name: str) -> None:
-    problem = load(name)
-    cold = problem.with_values(heat_loss_W_per_Nm2=0.0)
-    for x in candidates(problem):
-        slow = copy.copy(x)
-        slow[1:7], slow[-1] = 0.0, SLOW_S
-        assert 0.0 < evaluated(cold, x).indexes["power_W"] < evaluated(problem, x).indexes["power_W"]
-        assert (
-            evaluated(cold, slow).indexes["power_W"] < 1e-3 < evaluated(problem, slow).indexes["power_W"]
-        )  # standing still costs heat only

@@ -49,12 +49,3 @@ def test_results_are_computed_once_and_damaged_ones_again(jobs: int, tmp_path: P
     assert Memo(out).compute_all(computations, jobs=jobs) == expected
     assert sorted(path.name[0] for path in calls.iterdir()).count("5") == 1
     assert Memo(out).compute("step-5", {"k": 6}, lambda: None) is None  # other inputs
-
-
-def test_what_was_computed_before_a_failure_is_stored(tmp_path: Path) -> None:
-    def fail() -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        Memo(tmp_path).compute_all({"one": ({}, lambda: 1), "two": ({}, fail)})
-    assert Memo(tmp_path).compute_all({"one": ({}, fail), "two": ({}, lambda: 2)}) == {"one": 1, "two": 2}

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -76,23 +75,6 @@ def test_what_depends_on_the_robot_follows_from_its_file(path: str) -> None:
     assert measure_leg(load_robot(path), "R") == LegGeometry((0.0, -HIP_OFFSET, -0.085), THIGH, TIBIA, 0.04519)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_steps_may_be_longer(name: str) -> None:
-    problem = load(name, step_length_m=0.08)
-    arrays = problem.signals((problem.lower + problem.upper) / 2).arrays
-    assert arrays["left_foot"][-1, 0] == 0.08
-    assert arrays["right_foot"][-1, 0] == pytest.approx(0.16)
-    assert problem.dense(2) is not None
-    assert problem.options["step_length_m"] == 0.08
-
-
-@pytest.mark.parametrize("step", [-0.06, np.nan, np.inf, "far", True])
-@pytest.mark.parametrize("name", NAMES)
-def test_steps_of_no_length_are_refused(name: str, step: Any) -> None:
-    with pytest.raises(InputError, match="step_length_m must be a finite number"):
-        load(name, step_length_m=step)
-
-
 def test_joints_that_no_gait_moves_are_locked(tmp_path: Path) -> None:
     """A finger of 0.01 kg, and a robot without a head."""
     raw = nao()
@@ -117,32 +99,11 @@ def changed(group: str, name: str, **values: object) -> Callable[[Record], None]
 
 
 MISFITS = [
-    (
-        changed("joints", "RHipRoll", axis=[-1.0, 0.0, 0.0]),
-        r"joint 'RHipRoll': its axis must be \[1\.0, 0\.0, 0\.0\].*reversed",
-    ),
-    (
-        changed("joints", "LKneePitch", axis=[0.0, 0.999, 0.0447]),
-        r"joint 'LKneePitch': its axis must be \[0\.0, 1\.0, 0\.0\]",
-    ),
-    (
-        changed("joints", "LKneePitch", origin_m=[0.01, 0.0, -0.1]),
-        r"joint 'LKneePitch': .*straight below.*got \[0\.01, 0",
-    ),
-    (changed("joints", "RAnklePitch", origin_m=[0.0, 0.0, 0.1]), r"joint 'RAnklePitch': .*straight below.*0\.1\]"),
-    (
-        changed("joints", "LHipPitch", origin_m=[0.0, 0.0, -0.02]),
-        r"joint 'LHipPitch': its axis must cross that of 'LHipRoll'",
-    ),
-    (
-        changed("joints", "LAnkleRoll", origin_m=[0.0, 0.0, -0.02]),
-        r"joint 'LAnkleRoll': .* cross that of 'LAnklePitch'",
-    ),
-    (
-        changed("feet", "left", link="LAnklePitch"),
-        r"foot 'left': its link must be 'l_ankle', which joint 'LAnkleRoll' carries",
-    ),
-    (changed("feet", "right", link="l_ankle"), r"foot 'right': its link must be 'r_ankle'"),
+    (changed("joints", "RHipRoll", axis=[-1.0, 0.0, 0.0]), r"joint 'RHipRoll': its axis must be .*reversed"),
+    (changed("joints", "LKneePitch", origin_m=[0.01, 0.0, -0.1]), r"joint 'LKneePitch': .*straight below"),
+    (changed("joints", "LHipPitch", origin_m=[0.0, 0.0, -0.02]), r"joint 'LHipPitch': .* cross that of 'LHipRoll'"),
+    (changed("joints", "LAnkleRoll", origin_m=[0.0, 0.0, -0.02]), r"joint 'LAnkleRoll': .* cross that"),
+    (changed("feet", "left", link="LAnklePitch"), r"foot 'left': its link must be 'l_ankle'"),
     (changed("joints", "LHipYawPitch", parent="LShoulder"), r"joint 'LHipYawPitch': its parent must be link 'torso'"),
 ]
 

@@ -151,16 +151,12 @@ def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: l
     assert figures["lift_off_torque_jump_Nm"] == pytest.approx(np.abs(lift_off).max(), rel=ROUNDING)
 
 
-def test_the_published_limits_are_the_defaults() -> None:
+def test_the_published_limits_are_the_defaults_and_ranges_are_shares_of_the_legs_length() -> None:
+    """Which is 0.2029 m."""
     problem = load("nao-cycle")
     means = [problem.value(f"{phase}_dbm_{axis}_mean_limit_m") for phase in ("ssp", "dsp") for axis in "xy"]
     assert means == [0.05, 0.02, 0.08, 0.08]
     assert problem.value("torque_change_limit_Nm") == 1.2
-
-
-def test_the_hip_and_the_step_range_over_shares_of_the_legs_length() -> None:
-    """Which is 0.2029 m."""
-    problem = load("nao-cycle")
     ranges = {"hip_x_lift_off_m": (-0.051, 0.051), "hip_x_touch_down_m": (-0.02, 0.101), "step_length_m": (0.02, 0.122)}
     for name, bounds in ranges.items():
         k = problem.variable_index(name)

@@ -33,11 +33,8 @@ def test_the_effort_counts_every_step_and_no_step_is_computed_twice() -> None:
     assert efforts[2] - efforts[1] == pytest.approx(2 * (efforts[1] - efforts[0]))
 
 
-def test_a_search_is_refused() -> None:
+def test_a_search_and_a_single_stair_are_refused() -> None:
     with pytest.raises(InputError, match="use solve"):
         nlp_gait.compile_objective(nlp_gait.load("stairs-climb", stairs=2, intervals=12))
-
-
-def test_a_climb_has_at_least_two_stairs() -> None:
     with pytest.raises(InputError, match=">= 2"):
         nlp_gait.load("stairs-climb", stairs=1)
