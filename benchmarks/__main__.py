@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import functions, ipopt, kernel, process
+from benchmarks import ipopt, kernel, process
 from benchmarks.gaitbench import overhead
 from benchmarks.rows import Row, table
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
@@ -24,7 +24,6 @@ GROUPS: Mapping[str, Callable[[int, int], list[Row]]] = {
     "paths": lambda rounds, _: kernel.paths(rounds),
     "torques": lambda rounds, _: kernel.torques(rounds),
     "growth": lambda rounds, _: kernel.growth(rounds),
-    "functions": lambda rounds, _: functions.rows(max(1, rounds // 2)),
     "swarms": lambda rounds, _: kernel.swarms(max(1, rounds // 5)),
     "derivatives": lambda rounds, _: ipopt.iteration(rounds),
     "nao-ssp": lambda _, starts: ipopt.few_rows(starts, "nao-ssp"),

@@ -18,9 +18,9 @@ from benchmarks.casadi_code import compiled_functions
 from benchmarks.rows import Array, Row, ratio, side_by_side
 from metaheuristics import ParticleSwarm, minimize
 from metaheuristics.interface import BatchObjective
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.kernel.compiled import SHARED, NativeRows
-from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
-from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel, write_rows_source
+from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes, write_rows_source
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.nao.body import make_nao
@@ -42,11 +42,11 @@ def candidates(problem: GaitProblem, count: int) -> Array:
 def paths(rounds: int) -> list[Row]:
     """The objective with its violation by every path, one core, batch 1000."""
     problem = nlp_gait.load("nao-ssp")
-    kernel, X = build_kernel(problem), candidates(problem, BATCH)
+    X = candidates(problem, BATCH)
     objective = nlp_gait.compile_objective(problem, require_compiler=True, threads=1)
     scalar = nlp_gait.compile_objective(problem, require_compiler=True, threads=1, lanes=1)
     by_hand = ByHand()
-    machine = _with_violation(kernel, problem)
+    machine = _with_violation(problem)
     share = 20  # the slow paths get a part of the batch
     few = X[: BATCH // share]
     columns, parameters = few.T.copy(), np.repeat(problem.p[:, None], len(few), axis=1)
@@ -92,10 +92,10 @@ def paths(rounds: int) -> list[Row]:
     ]
 
 
-def _with_violation(kernel: Kernel, problem: GaitProblem) -> Function:
+def _with_violation(problem: GaitProblem) -> Function:
     """Cost and violation as one CasADi function of (x, p), without what does not belong to them."""
     x, p = MX.sym("x", len(problem.names)), MX.sym("p", len(problem.p))
-    cost, violation, *_ = kernel.model.function.call([x, p], True, False)
+    cost, violation, *_ = build_exact_model(problem).function.call([x, p], True, False)
     return Function("with_violation", [x, p], [cost, violation])
 
 

@@ -1,7 +1,7 @@
 """Biped gait problems, written once as symbolic CasADi models.
 
 ``load`` makes a problem; ``solve`` gives it to IPOPT, or to another NLP solver (``make_solver``); ``compile_objective`` gives its
-exact functions to search algorithms, and ``compile_function`` compiles any CasADi function for batches.
+exact functions to search algorithms.
 """
 
 from __future__ import annotations
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from compare.report.compared_study import compare as compare
     from nlp_gait.backends.kernel.compiled import CompiledObjective as CompiledObjective
     from nlp_gait.backends.kernel.compiled import compile_objective as compile_objective
-    from nlp_gait.backends.kernel.compiled_function import CompiledFunction as CompiledFunction
-    from nlp_gait.backends.kernel.compiled_function import compile_function as compile_function
     from nlp_gait.backends.plan_walk import WalkPlan as WalkPlan
     from nlp_gait.backends.plan_walk import WalkSettings as WalkSettings
     from nlp_gait.backends.plan_walk import plan_climb as plan_climb
@@ -41,7 +39,6 @@ _PUBLIC = {
     "nlp_gait.formulation.plain_problem": "problem",
     "nlp_gait.formulation.solution": "Solution",
     "nlp_gait.backends.kernel.compiled": "CompiledObjective compile_objective",
-    "nlp_gait.backends.kernel.compiled_function": "CompiledFunction compile_function",
     "nlp_gait.backends.plan_walk": "WalkPlan WalkSettings plan_climb plan_route plan_walk",
     "nlp_gait.backends.solve": "solve",
     "nlp_gait.backends.solvers.ipopt": "IpoptSettings",

@@ -23,7 +23,6 @@ ORDER = (
     "physics_engine.py",
     "tune_in_engine.py",
     "export_motion.py",
-    "compile_function.py",
     "notebook.py",
     "slider.py",
     "cluster.py",

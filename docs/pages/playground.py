@@ -20,8 +20,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from docs.pages.markdown import page, write_all
 from docs.pages.webassembly import REMEDY, compile_module, has_compiler
-from nlp_gait.backends.kernel.compiled_function import make_kernel
-from nlp_gait.backends.kernel.kernel_source import write_rows_source
+from nlp_gait.backends.kernel.compiler import write_rows_source
 from nlp_gait.formulation import InstantPoint
 from nlp_gait.gaitbench import load
 from nlp_gait.gaitbench.c_export import export_objective, make_prefix
@@ -114,7 +113,7 @@ def compile_instance(instance: Instance, frame: ca.Function) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         objective, *_ = export_objective(instance, Path(folder))
         gait = Path(folder) / "gait.cpp"
-        gait.write_text(write_rows_source(make_kernel(frame)), encoding="utf-8")
+        gait.write_text(write_rows_source(frame), encoding="utf-8")
         exports = (f"{make_prefix(instance.id)}_evaluate", "nlp_gait_evaluate_rows", "nlp_gait_rows_memory", "malloc")
         return compile_module([objective, gait], exports)
 
@@ -189,4 +188,4 @@ def write_frames(phase: Phase) -> Frames:
         "lines": [{"side": side, "count": len(line)} for side, line in lines],
         "feet": [{"side": side, "outline": sole.corners[0].tolist()} for side, sole in feet.items()],
     }
-    return Frames(function=ca.Function("frame", [x, s], simplify([frame])), facts=facts)
+    return Frames(function=ca.Function("kernel", [x, s], [ca.densify(*simplify([frame]))]), facts=facts)

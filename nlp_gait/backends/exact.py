@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from random import Random
 from typing import NamedTuple
 
@@ -43,6 +44,20 @@ class ExactModel:
     row_units: tuple[str, ...]  #: (m,)
     row_scales: Array  #: (m,) scales of the violations [unit of the row]
     index_names: tuple[str, ...]
+
+    @cached_property
+    @lock_casadi
+    def kernel(self) -> ca.Function:
+        """(x, p) to cost and g (m,): what is evaluated for each candidate."""
+        x, p = self.function.mx_in()
+        cost, _, g, *_ = self.function.call([x, p], True, False)
+        return ca.Function("kernel", [x, p], [cost, g])
+
+    def row_bounds(self, problem: GaitProblem) -> tuple[Array, Array]:
+        """Return lower and upper bounds (m,) of the rows for the problem's parameter values."""
+        values = self.at(problem.lower, problem.p)
+        check_row_bounds(problem, self.row_names, values.lower, values.upper)
+        return values.lower, values.upper
 
     @lock_casadi
     def at(self, x: Sequence[float] | Array, p: Array) -> ExactValues:

@@ -7,8 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import hash_json, identify_problem, make_key
-from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.backends.kernel.library_cache import find_cache_folder
 from nlp_gait.backends.solve import solve
 from nlp_gait.decoding import read_dataclass
@@ -89,9 +89,8 @@ def compute_facts(instance: Judged, starts: int) -> Facts:
 
 def evaluate_interpreted(instance: Judged, x: Array) -> tuple[float, Array]:
     """Return cost and rows (m,) at x (n,) without compiling anything."""
-    kernel = build_kernel(instance.gait_problem)
-    cost, g = kernel.function(x, instance.gait_problem.p)
-    return float(cost), instance.sides(np.array(g).reshape(1, -1))[0]
+    values = build_exact_model(instance.gait_problem).at(x, instance.gait_problem.p)
+    return values.cost, instance.sides(values.g[None])[0]
 
 
 def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:

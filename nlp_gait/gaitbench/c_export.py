@@ -5,8 +5,8 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from nlp_gait.backends.kernel.compiler import BASE_FLAGS, read_native_source
-from nlp_gait.backends.kernel.kernel_source import build_kernel, write_rows_source
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.kernel.compiler import BASE_FLAGS, read_native_source, write_rows_source
 from nlp_gait.export.c_files import format_comment, write_c_files
 from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.instance import Instance
@@ -38,14 +38,14 @@ def make_prefix(id: str) -> str:
 def make_cpp_source(instance: Instance) -> str:
     """Return the C++ file: the kernel over lanes, the instance's constants, the functions of the header."""
     problem, sides = instance.gait_problem, instance.sides
-    kernel = build_kernel(problem)
-    lower, upper = kernel.row_bounds(problem)
+    model = build_exact_model(problem)
+    lower, upper = model.row_bounds(problem)
     prefix = make_prefix(instance.id)
     constants = {
         "instance_parameters": problem.p,
         "instance_lower": lower,
         "instance_upper": upper,
-        "instance_weights": kernel.weights,
+        "instance_weights": 1.0 / model.row_scales,
     }
     arrays = {"lower": instance.lower, "upper": instance.upper, "best_x": instance.best_x}
     listed = {"variable_names": instance.names, "row_names": sides.names}
@@ -57,7 +57,7 @@ def make_cpp_source(instance: Instance) -> str:
             "#ifndef LANES\n#define LANES 1  // points at a time: 1, 2, 4 or 8\n#endif",
             "#include <math.h>\n#include <stdlib.h>\n#include <string.h>\n#include <utility>",
             "namespace {  // so that a program can have several instances",
-            write_rows_source(kernel.function, objective=True).replace('extern "C" EXPORT', "static"),
+            write_rows_source(model.kernel, objective=True).replace('extern "C" EXPORT', "static"),
             "}  // namespace",
             *(f"static const double {name}[] = {_format_numbers(values)};" for name, values in constants.items()),
             f"static const int instance_rows[] = {{{', '.join(map(str, sides.row.tolist()))}}};",

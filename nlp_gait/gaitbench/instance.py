@@ -8,8 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from nlp_gait.backends.exact import ExactModel, build_exact_model
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
-from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
 from nlp_gait.errors import InputError, check_name
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.adapters import find_adapter
@@ -24,18 +24,18 @@ _BUILDING = threading.RLock()  # compiled functions are shared by all threads, a
 class OneSidedRows:
     """The m rows of a problem as one-sided rows, G <= 0 in units of each row's scale, without the variables' bounds."""
 
-    def __init__(self, kernel: Kernel, problem: GaitProblem) -> None:
-        lower, upper = kernel.row_bounds(problem)
+    def __init__(self, model: ExactModel, problem: GaitProblem) -> None:
+        lower, upper = model.row_bounds(problem)
         rows = len(lower) - len(problem.names)
         both = np.stack([lower[:rows], upper[:rows]], axis=1)
         self.row, side = (np.asarray(indexes) for indexes in np.nonzero(np.isfinite(both)))  # (m,) rows of the kernel
         self.sign = np.where(side == 1, 1.0, -1.0)  # (m,) +1 for an upper bound
         self.bound = both[self.row, side]  # (m,) [unit of the row]
-        self.weight = kernel.weights[self.row]  # (m,) 1 / scale
-        self.groups = tuple(kernel.model.row_groups[r] for r in self.row)  # (m,) names of the constraints
+        self.weight = 1.0 / model.row_scales[self.row]  # (m,) 1 / scale
+        self.groups = tuple(model.row_groups[r] for r in self.row)  # (m,) names of the constraints
         words = (">= lower", "<= upper")
         # (m,) for example ``torque_change[LKneePitch, 3] <= upper``
-        self.names = tuple(f"{kernel.model.row_names[r]} {words[s]}" for r, s in zip(self.row, side, strict=True))
+        self.names = tuple(f"{model.row_names[r]} {words[s]}" for r, s in zip(self.row, side, strict=True))
 
     def __call__(self, g: Array) -> Array:
         """Return the one-sided rows (P, m) of the kernel's rows (P, ...)."""
@@ -157,7 +157,7 @@ class Instance:
     def sides(self) -> OneSidedRows:
         """Which one-sided rows the kernel's rows make."""
         with _BUILDING:
-            return OneSidedRows(build_kernel(self.gait_problem), self.gait_problem)
+            return OneSidedRows(build_exact_model(self.gait_problem), self.gait_problem)
 
     @cached_property
     def _derivatives(self) -> ca.Function:
@@ -206,6 +206,6 @@ def _load(id: str, unit_cube: bool) -> Instance:
 
 def _build_derivatives(problem: GaitProblem) -> ca.Function:
     x, p = ca.MX.sym("x", len(problem.names)), ca.MX.sym("p", len(problem.parameters))
-    cost, g = build_kernel(problem).function(x, p)
+    cost, g = build_exact_model(problem).kernel(x, p)
     rows = g[: g.shape[0] - len(problem.names)]
     return ca.Function("derivatives", [x, p], [ca.gradient(cost, x), ca.densify(ca.jacobian(rows, x))])

@@ -14,7 +14,6 @@ import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
@@ -85,16 +84,16 @@ class AffineBounds(Bounds):
     """Affine bounds of a problem's exact functions over boxes of its variables."""
 
     def __init__(self, problem: GaitProblem) -> None:
-        kernel = build_kernel(problem)
-        n, self._rows = len(problem.names), len(kernel.model.row_names) - len(problem.names)
-        lower, upper = kernel.row_bounds(problem)
-        slack = FEASIBILITY_TOLERANCE * kernel.model.row_scales
+        model = build_exact_model(problem)
+        n, self._rows = len(problem.names), len(model.row_names) - len(problem.names)
+        lower, upper = model.row_bounds(problem)
+        slack = FEASIBILITY_TOLERANCE * model.row_scales
         self._lower, self._upper = _down(lower - slack)[: self._rows], _up(upper + slack)[: self._rows]
         self._p = np.stack([problem.p] * 2, axis=-1)
         self._symbols = np.concatenate([np.arange(n), np.full(len(problem.p), -1)])
         self._scale = problem.scale
         # Of x and p to cost and rows; the last n rows are the variables themselves.
-        self.function = AffineFunction(kernel.function)
+        self.function = AffineFunction(model.kernel)
         self.root = np.stack([problem.lower, problem.upper], axis=-1)[None]
 
     def _prune(self, boxes: Array, target: float) -> Remaining:

@@ -34,7 +34,6 @@ EXPECTED = {
     "results_from_matlab.py": "paper (MATLAB): 2 of 2 feasible, claims 1.0682 W, judged 0.6265 W at best",
     "custom_robot.py": "nao-with-a-load: 0 kg, 0.845869 W",
     "export_motion.py": "gait.motion: 102 lines",
-    "compile_function.py": "cost 3.60 without a push",
 }
 FEWER = {
     "first_solve.py": ("starts=3", "starts=1"),
@@ -42,7 +41,6 @@ FEWER = {
     "your_own_objective.py": ("(0.0, 0.1, 0.3, 1.0)", "(0.0,)"),
     "your_own_limit.py": ("(3.0, 1.4, 1.2, 1.1)", "(1.4,)"),
     "your_own_algorithm.py": ("range(5)", "range(2)"),
-    "compile_function.py": ("range(300)", "range(3)"),
     "custom_robot.py": ("(0.0, 0.5, 1.0)", "(0.0,)"),
 }
 # Run by the gallery alone: they print no number, or those of a sweep, a study and a simulation, which tests of these check.

@@ -10,7 +10,7 @@ import pytest
 from casadi import SX
 
 import nlp_gait
-from nlp_gait.backends.kernel.kernel_source import build_kernel
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.proofs.affine import AffineForms, AffineFunction
 from nlp_gait.proofs.quadratic import QuadraticForms, QuadraticFunction
@@ -184,8 +184,8 @@ def test_every_operation_encloses_exact_values_at_random_points(quadratic: bool)
 @pytest.mark.parametrize("name", [pytest.param("walk12", marks=pytest.mark.slow), "nao-dsp"])
 def test_problems_hold_every_value_at_sampled_points_of_random_boxes(name: str) -> None:
     problem = nlp_gait.load(name, intervals=2)
-    kernel, rng = build_kernel(problem), np.random.default_rng(SEED)
-    function, n = AffineFunction(kernel.function), len(problem.names)
+    model, rng = build_exact_model(problem), np.random.default_rng(SEED)
+    function, n = AffineFunction(model.kernel), len(problem.names)
     symbols = np.r_[np.arange(n), np.full(len(problem.p), -1)]
     finite = 0
     for width in (0.5, 0.1, 0.01, 1e-3, 1e-6):
@@ -193,7 +193,7 @@ def test_problems_hold_every_value_at_sampled_points_of_random_boxes(name: str) 
         box = np.stack([np.maximum(problem.lower, middle - half), np.minimum(problem.upper, middle + half)], -1)
         forms = function(np.concatenate([box, np.stack([problem.p] * 2, -1)])[None], symbols)
         X = rng.uniform(box[:, 0], box[:, 1], (POINTS, n))
-        values = np.vstack([part.full() for part in kernel.function.map(POINTS)(X.T, problem.p)]).T
+        values = np.vstack([part.full() for part in model.kernel.map(POINTS)(X.T, problem.p)]).T
         slack = ROUNDING * (1 + np.abs(values))
         assert np.all((forms.lower <= values + slack) & (values - slack <= forms.upper))
         share = (X - box.mean(axis=-1)) / (np.ptp(box, axis=-1) / 2)

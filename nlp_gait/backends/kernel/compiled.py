@@ -11,15 +11,21 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
-from pathlib import Path
 from random import Random
 from typing import Any, Literal
 
-import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.kernel.compiler import BASE_FLAGS, Compiler, find_compiler, lane_flags, native_lanes
-from nlp_gait.backends.kernel.kernel_source import SYMBOLS, build_kernel, write_rows_source
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.kernel.compiler import (
+    BASE_FLAGS,
+    SYMBOLS,
+    Compiler,
+    find_compiler,
+    lane_flags,
+    native_lanes,
+    write_rows_source,
+)
 from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import CompilerError, InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem
@@ -29,8 +35,7 @@ from nlp_gait.formulation.numbers import to_floats
 _INTEGER, _POINTER = ctypes.c_longlong, ctypes.c_void_p
 # Of the inputs of an objective, which all candidates share: parameters, lower and upper bounds, weights.
 SHARED = b"\0\1\1\1\1"
-# Candidates in one call of the virtual machine; more would only use more memory.
-BLOCKS = (64, 16, 4, 1)
+BLOCK = 64  # candidates in one call of the virtual machine; more would only use more memory
 
 
 class NativeRows:
@@ -87,31 +92,20 @@ class InterpretedRows:
     backend: Literal["interpreted"] = "interpreted"
 
     def __init__(self, problem: GaitProblem) -> None:
-        function = build_kernel(problem).function
-        self._blocks = {}
-        for size in BLOCKS:
-            x, p = ca.MX.sym("x", function.size1_in(0), size), ca.MX.sym("p", function.size1_in(1))
-            self._blocks[size] = ca.Function("block", [x, p], function.map(size)(x, ca.repmat(p, 1, size)))
+        self._function = build_exact_model(problem).function
         self.description = "interpreted by CasADi's virtual machine"
 
     @lock_casadi
     def __call__(self, inputs: Sequence[Array], shared: bytes, outputs: Sequence[Array | None], rows: int) -> None:
         """Fill the outputs as ``NativeRows`` of an objective, whose inputs share all but the first."""
-        (X, p, lower, upper, weights), (f, g, violation) = inputs, outputs
-        assert f is not None and violation is not None  # for the type checker
-        first = 0
-        for size, block in self._blocks.items():
-            while rows - first >= size:
-                cut = slice(first, first + size)
-                cost, values = (np.array(output).T for output in block(X[cut].T, p))
-                # Plain maximum, not fmax: a NaN must not pass for feasible.
-                violations = np.maximum(np.maximum(lower - values, values - upper), 0.0)
-                finite = np.isfinite(X[cut]).all(axis=1)
-                f[cut] = np.where(finite, cost[:, 0], np.inf)
-                violation[cut] = np.where(finite, violations @ weights, np.inf)
-                if g is not None:
-                    g[cut] = values
-                first += size
+        for first in range(0, rows, BLOCK):
+            cut = slice(first, min(first + BLOCK, rows))
+            X = inputs[0][cut]
+            values = [np.array(value).T for value in self._function(X.T, inputs[1])[:3]]
+            cost, violation = (np.where(np.isfinite(X).all(axis=1), value[:, 0], np.inf) for value in values[:2])
+            for output, value in zip(outputs, (cost, values[2], violation), strict=True):
+                if output is not None:
+                    output[cut] = value
 
 
 # Least work of a thread; handing over work costs about 0.05 ms.
@@ -170,18 +164,18 @@ class CompiledObjective:
         rebuild: Callable[..., "CompiledObjective"],
     ) -> None:
         """Use ``compile_objective`` instead; ``rebuild`` makes this objective from its problem."""
-        kernel = build_kernel(problem)
+        model = build_exact_model(problem)
         self.problem = problem  #: with the parameter values to use
         self.names = problem.names  #: (n,) variables
         self.lower = problem.lower  #: (n,) current lower bounds
         self.upper = problem.upper  #: (n,) current upper bounds
-        self.row_names = kernel.model.row_names  #: (m,) constraint rows, in the order of ``constraints``
+        self.row_names = model.row_names  #: (m,) constraint rows, in the order of ``constraints``
         self.backend: Literal["compiled", "interpreted"] = evaluate_rows.backend
         self.description = evaluate_rows.description  #: backend, compiler and lane count, in words
         self._evaluate_rows = evaluate_rows
-        self._shared = (np.array(problem.p), *kernel.row_bounds(problem), kernel.weights)
+        self._shared = (np.array(problem.p), *model.row_bounds(problem), 1.0 / model.row_scales)
         #: (m - n,) names of the rows without their places, those of the variables left out
-        self.groups = kernel.model.row_groups[: -len(self.names)]
+        self.groups = model.row_groups[: -len(self.names)]
         self._threads = RowThreads(threads)
         self._rebuild = rebuild
         self._local = threading.local()
@@ -267,10 +261,12 @@ def compile_objective(
     if not problem.searchable:
         n = len(problem.names)
         raise InputError(f"{problem.name} has {n} variables tied by equations, which no search can satisfy; use solve")
-    used, count = check_parallelism(threads, lanes)
+    used = available_cores() if threads is None else check_count("threads", threads, at_most=MOST_THREADS)
+    if lanes is not None and check_count("lanes", lanes) not in LANE_COUNTS:
+        raise InputError(f"lanes must be 1, 2, 4 or 8, got {lanes}")
     evaluate_rows: NativeRows | InterpretedRows
     try:
-        evaluate_rows = problem.build_once(_build_native, find_compiler(), count)
+        evaluate_rows = problem.build_once(_build_native, find_compiler(), lanes or native_lanes())
     except CompilerError as error:
         if require_compiler:
             raise
@@ -283,44 +279,27 @@ def compile_objective(
 
 
 def _build_native(problem: GaitProblem, compiler: Compiler, lanes: int) -> NativeRows:
-    kernel = build_kernel(problem)
-    source = write_rows_source(kernel.function, objective=True)
+    """Build the library, and check it against the virtual machine: CompilerError if half of the points differ.
+
+    Not if a few of them do: where rounding decides a jump, both may be right.
+    """
+    model = build_exact_model(problem)
+    source = write_rows_source(model.kernel, objective=True)
     native = NativeRows(source, compiler, lanes, scalar_functions=problem.hints.amplifies_rounding)
     draw = Random(0).random  # NumPy's generators would take a tenth of a process's start to import
     shares = np.array([[draw() for _ in problem.names] for _ in range(CHECK_POINTS)])
-    X, p = problem.lower + shares * (problem.upper - problem.lower), np.array(problem.p)
-    lower, upper = kernel.row_bounds(problem)
-    f, violation, g = np.empty(CHECK_POINTS), np.empty(CHECK_POINTS), np.empty((CHECK_POINTS, len(lower)))
-    native((X, p, lower, upper, kernel.weights), SHARED, (f, g, violation), CHECK_POINTS)
-    check_agreement(kernel.function, [X, np.tile(p, (CHECK_POINTS, 1))], [f[:, None], g], native.library)
-    return native
-
-
-def check_agreement(function: ca.Function, inputs: Sequence[Array], outputs: Sequence[Array], library: Path) -> None:
-    """Raise CompilerError if a library's outputs differ from the virtual machine's at half of the points or more.
-
-    Not at a few of them: where rounding decides a jump, both may be right. Inputs and outputs have a row for each point.
-    """
-    expected = []
-    for point in zip(*inputs, strict=True):
-        arguments = [ca.reshape(ca.DM(row), *function.size_in(i)) for i, row in enumerate(point)]
-        values = [ca.vec(ca.densify(value)).full().ravel() for value in function.call(arguments)]
-        expected.append(np.concatenate(values))
-    computed = np.concatenate(outputs, axis=1)
+    X = problem.lower + shares * (problem.upper - problem.lower)
+    inputs = X, np.array(problem.p), *model.row_bounds(problem), 1.0 / model.row_scales
+    f, violation, g = np.empty(CHECK_POINTS), np.empty(CHECK_POINTS), np.empty((CHECK_POINTS, len(model.row_names)))
+    native(inputs, SHARED, (f, g, violation), CHECK_POINTS)
+    points = [model.at(x, problem.p) for x in X]
+    computed, expected = np.column_stack([f, g]), [np.append(point.cost, point.g) for point in points]
     alike = np.isclose(computed, expected, rtol=CHECK_TOLERANCE, atol=CHECK_TOLERANCE, equal_nan=True).all(axis=1)
-    if 2 * np.count_nonzero(alike) <= len(computed):
+    if 2 * np.count_nonzero(alike) <= CHECK_POINTS:
         raise CompilerError(
-            f"{library} computes other values than the virtual machine; delete it, and try another compiler (CXX)"
+            f"{native.library} computes other values than the virtual machine; delete it, and try another compiler (CXX)"
         )
-
-
-def check_parallelism(threads: int | None, lanes: int | None) -> tuple[int, int]:
-    """Return the number of threads, all cores for None, and of lanes, the CPU's best for None; raises InputError."""
-    if threads is not None:
-        threads = check_count("threads", threads, at_most=MOST_THREADS)
-    if lanes is not None and check_count("lanes", lanes) not in LANE_COUNTS:
-        raise InputError(f"lanes must be 1, 2, 4 or 8, got {lanes}")
-    return threads or available_cores(), native_lanes() if lanes is None else lanes
+    return native
 
 
 def available_cores() -> int:

@@ -1,9 +1,10 @@
-"""The C++ compiler of this machine, its version and flags; it runs with a time limit."""
+"""C++ source of a function over lanes, and the compiler of this machine with its flags and a time limit."""
 
 import functools
 import logging
 import os
 import platform
+import re
 import shlex
 import shutil
 import signal
@@ -16,12 +17,15 @@ from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 
+import casadi as ca
+
 from nlp_gait.errors import CompilerError
 
 TIME_LIMIT_S = 300.0
 VERSION_TIME_LIMIT_S = 20.0
 SILENT_S = 5.0  # after which the user is told what is waited for
 COMMON_NAMES = ("c++", "g++", "clang++")
+SYMBOLS = ("nlp_gait_rows_memory", "nlp_gait_evaluate_rows")  # functions of ``write_rows_source``
 HOW_TO_GET_ONE = (
     "to get a compiler: pip install ziglang, or your system's g++ or clang++, or name one in the environment "
     "variable CXX"
@@ -29,15 +33,6 @@ HOW_TO_GET_ONE = (
 # No -ffast-math: NaN and infinity keep their meaning. No contraction to fused multiply-add, which gains nothing: so results are
 # the virtual machine's bits, except where libm's vector functions round differently. Hidden symbols: its helpers are inlined.
 BASE_FLAGS = ("-std=c++17", "-O2", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-w")
-
-# Runs a program that ends with this process, however this process ends: then the pipe on its standard input is closed.
-WATCHED = (
-    "/bin/sh",
-    "-c",
-    'exec 3<&0 </dev/null; "$@" 3<&- & program=$!; { read -r _ <&3; kill -KILL 0; } >/dev/null 2>&1 & watch=$!; '
-    'wait "$program"; status=$?; { kill "$watch"; wait "$watch"; } 2>/dev/null; exit "$status"',
-    "sh",
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,10 +55,9 @@ class Compiler:
             raise CompilerError(f"{Path(self.command[0]).name} exited with status 0, but wrote no library")
 
 
-def read_native_source(package: str, *names: str) -> str:
-    """Return the C++ of files in a package's folder ``native``, one after the other."""
-    native = files(package) / "native"
-    return "\n".join((native / name).read_text(encoding="utf-8") for name in names)
+def read_native_source(package: str, name: str) -> str:
+    """Return the C++ of a file in a package's folder ``native``."""
+    return (files(package) / "native" / name).read_text(encoding="utf-8")
 
 
 def find_compiler() -> Compiler:
@@ -100,22 +94,19 @@ def _find(cxx: str, cc: str, path: str) -> Compiler:
 
 def _run(command: Sequence[str], time_limit_s: float) -> str:
     program = Path(command[0]).name
-    read_end, write_end = os.pipe()
-    try:
+    pipe = subprocess.PIPE
+    try:  # in a session of its own, so that the compiler's children can be killed with it
         process = subprocess.Popen(
-            [*WATCHED, *command] if os.name == "posix" else command,
-            stdin=read_end,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=pipe,
+            stderr=pipe,
             text=True,
             errors="replace",
-            start_new_session=True,  # so that the compiler's own children can be killed with it
+            start_new_session=True,
         )
     except OSError as error:
-        os.close(write_end)
         raise CompilerError(f"{program} cannot be run: {error}") from error
-    finally:
-        os.close(read_end)
     try:
         try:
             output, messages = process.communicate(timeout=SILENT_S)
@@ -129,12 +120,10 @@ def _run(command: Sequence[str], time_limit_s: float) -> str:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
-        os.close(write_end)
     if process.returncode != 0:
         lines = [line.strip() for line in messages.splitlines() if line.strip()]
         reason = next((line for line in lines if "error" in line.lower()), lines[-1] if lines else "no message")
-        status = process.returncode if process.returncode <= 128 else 128 - process.returncode  # sh: 128 + signal
-        raise CompilerError(f"{program} failed with exit status {status}: {reason}")
+        raise CompilerError(f"{program} failed with exit status {process.returncode}: {reason}")
     return output
 
 
@@ -167,3 +156,35 @@ def lane_flags(lanes: int) -> tuple[str, ...]:
     if platform.machine().lower() in ("x86_64", "amd64"):
         return tuple(f"-m{feature}" for feature in X86_SETS.get(lanes, ()))
     return ()
+
+
+def write_rows_source(function: ca.Function, *, objective: bool = False) -> str:
+    """Return the C++ source of a function named ``kernel`` with dense results; the lane count is the macro LANES.
+
+    With ``objective``, the function is (x, p) to (cost, g), and the code also computes the violation, see ``rows.hpp``.
+    """
+    inputs = [str(function.numel_in(i)) for i in range(function.n_in())]
+    outputs = [str(function.numel_out(i)) for i in range(function.n_out())] + ["1"] * objective
+    sources = [
+        "#include <utility>",
+        read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
+        _generate_lane_code(function),
+        *["#define OBJECTIVE"] * objective,
+        f"enum {{ INPUTS = {len(inputs)}, OUTPUTS = {len(outputs)} }};",
+        f"static const long long input_size[] = {{{', '.join(inputs)}}};",
+        f"static const long long output_size[] = {{{', '.join(outputs)}}};",
+        read_native_source("nlp_gait.backends.kernel", "rows.hpp"),
+    ]
+    return "\n".join(sources)
+
+
+def _generate_lane_code(function: ca.Function) -> str:
+    """Return CasADi's C code of a function, over the numbers of lanes.hpp."""
+    generator = ca.CodeGenerator("kernel", {"casadi_real": "Lanes"})
+    generator.add(function)
+    entry = r"(\(\*\w+\+\+\)|\w+(?:\[i\])?)"  # of a vector, in a loop
+    code = re.sub(rf"\({entry}\?{entry}:0\)", r"if_else_zero(\1,\2)", generator.dump())
+    if function.is_a("SXFunction"):  # no argument or result is left out
+        code = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", code))
+    code = code.replace("x<0 ? -1 : x>0 ? 1 : x", "sign_of(x)")
+    return f"#define __STDC_VERSION__ 199901L  // so that the generated code calls fmin, fmax and fabs of lanes.hpp\n{code}"

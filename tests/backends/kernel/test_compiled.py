@@ -5,9 +5,9 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
-from casadi import exp, sin
 
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
@@ -197,7 +197,7 @@ def test_the_sanitizer_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_amplifies_rounding_is_the_same_on_many_lanes_as_on_one(lanes: int) -> None:
     """In the tracked step a rounding error decides steps of the controller: with vector functions 5 % of candidates differ."""
     assert problem_named("stairs-track").hints.amplifies_rounding
-    mild = toy(lambda x, y, limit, ops: (sin(10 * x) * exp(y), ()))
+    mild = toy(lambda x, y, limit, ops: (ca.sin(10 * x) * ca.exp(y), ()))
     X, hints = candidates(mild), replace(mild.hints, amplifies_rounding=True)
     one, several = (compile_objective(replace(mild, hints=hints), lanes=n, require_compiler=True) for n in (1, lanes))
     assert all(np.array_equal(a, b) for a, b in zip(one(X), several(X), strict=True))
@@ -252,3 +252,22 @@ def test_one_point_has_the_values_of_a_batch_of_one(compiled: bool) -> None:
     for wrong in ([1.0], np.ones((1, 2)), np.array([True, False]), ["1", "2"]):
         with pytest.raises(InputError):
             objective.point(wrong)  # type: ignore[arg-type]
+
+
+ONE = "erf asinh acosh atanh sign floor ceil fabs log1p expm1 tan asin acos sinh cosh tanh sqrt exp log sin cos atan logic_not"
+TWO = "fmod remainder copysign atan2 hypot fmin fmax logic_and logic_or lt le eq ne power plus minus times rdivide"
+
+
+@pytest.mark.parametrize("lanes", sorted({1, LANES[-1]}))
+def test_scalar_operations_agree_with_casadi_also_for_nan(lanes: int) -> None:
+    x, y = ca.MX.sym("x", 4), ca.MX.sym("y", 4)
+    values = ca.vertcat(
+        *(getattr(ca, name)(x) for name in ONE.split()), *(getattr(ca, name)(x, y) for name in TWO.split())
+    )
+    g = ca.vertcat(values, ca.if_else(x[0] < y[0], x[1] ** 2, 1 / y[1]))
+    problem = nlp_gait.problem({"x": ca.veccat(x, y), "f": x[0], "g": g}, lbx=-2, ubx=2, lbg=-9)
+    objective = compile_objective(problem, require_compiler=True, lanes=lanes, threads=1)
+    points = np.random.default_rng(0).uniform(-2.0, 2.0, (21, 8))
+    points[3, :4], points[4, 4:], points[5, :4] = 0.0, points[4, :4], np.inf
+    expected = ca.Function("rows", [x, y], [g])(points[:, :4].T, points[:, 4:].T).full().T
+    np.testing.assert_allclose(objective.constraints(points)[:, :-8], expected, rtol=1e-12, atol=1e-12)
