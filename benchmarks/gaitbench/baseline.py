@@ -27,11 +27,10 @@ from compare.bench.baseline import (
     get_reference,
     list_baselines,
     load_table,
-    make_bench_study,
+    plan_bench_runs,
 )
 from compare.study.record import RunRecord
 from compare.study.run import Run
-from compare.study.settings import SolverSpec
 from compare.study.study import Study, run_study
 from nlp_gait import gaitbench
 from nlp_gait.files import replace_file, replace_nan, write_json
@@ -55,8 +54,7 @@ def main() -> None:
     table = {id: list(rows) for id, rows in load_table().items()}
     for id in ids:
         started = time.perf_counter()
-        solvers = [SolverSpec(name=name) for name in BASELINE]
-        tasks = make_bench_study([id], *solvers, runs=DRAWN_RUNS if is_generated(id) else RUNS).make_runs()
+        tasks = plan_bench_runs([id], dict.fromkeys(BASELINE, ""), runs=DRAWN_RUNS if is_generated(id) else RUNS)
         study = Study(runs=tuple(map(limit_time, tasks)), folder=arguments.work, jobs=arguments.jobs)
         table[id] = make_rows(run_study(study))
         write_table(row for rows in table.values() for row in rows)

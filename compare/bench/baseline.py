@@ -15,8 +15,7 @@ from typing import Literal, NamedTuple
 from compare.analysis.best_known import is_zero
 from compare.analysis.record_statistics import ECDF_TARGETS
 from compare.study.record import History, RunRecord, Times
-from compare.study.run import GRADIENT_SOLVERS, Handling, Inputs, ProblemSpec, Stop
-from compare.study.settings import SolverSpec, StudySettings
+from compare.study.run import GRADIENT_SOLVERS, Handling, Inputs, ProblemSpec, Run, Stop, plan_runs
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError, format_value
 from nlp_gait.gaitbench.facts import Subset
@@ -59,12 +58,12 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     return tuple(seeds)
 
 
-def make_bench_study(
-    instances: Sequence[str], *solvers: SolverSpec, runs: int = RUNS, evaluations: int = EVALUATIONS
-) -> StudySettings:
-    """Return the study of some solvers on some instances; run k has the seed k."""
-    problems = tuple(ProblemSpec(name=id) for id in instances)
-    return StudySettings(problems=problems, solvers=solvers, runs=runs, starts=runs, stop=Stop(evaluations=evaluations))
+def plan_bench_runs(
+    instances: Sequence[str], solvers: Mapping[str, str], *, runs: int = RUNS, evaluations: int = EVALUATIONS
+) -> tuple[Run, ...]:
+    """Return the runs of some solvers, each with its label or an empty text, on some instances; run k has the seed k."""
+    problems, labelled = [ProblemSpec(name=id) for id in instances], [(label, name) for name, label in solvers.items()]
+    return plan_runs(problems, labelled, runs=runs, starts=runs, stop=Stop(evaluations=evaluations))
 
 
 class BaselineRun(NamedTuple):

@@ -6,14 +6,13 @@ from typing import Annotated, Literal
 
 from typer import Option
 
-from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, load_table, make_bench_study
+from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, load_table, plan_bench_runs
 from compare.bench.leaderboard import make_leaderboard_page, rank_solvers
 from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
 from compare.cli.options import Evaluations, Jobs, Scheduler, parse_names
 from compare.cli.printing import Output, Rows, describe_command
 from compare.report.writing import add_origin, write_document
-from compare.study.settings import SolverSpec
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
 
@@ -69,12 +68,11 @@ def bench(
         solvers[algorithm] = label or (f"my-{algorithm}" if algorithm in BASELINE else "")  # the last one
     out, records, name = make_writable_folder(effort.out), [], None
     if solvers:
-        specs = [SolverSpec(name=solver, label=given) for solver, given in solvers.items()]
-        settings = make_bench_study(instances, *specs, runs=effort.runs, evaluations=effort.evaluations)
-        name = settings.make_runs()[-1].title if algorithm is not None else None
+        runs = plan_bench_runs(instances, solvers, runs=effort.runs, evaluations=effort.evaluations)
+        name = runs[-1].title if algorithm is not None else None
         if name in BASELINE:
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
-        records = run_in_folder(settings, out, effort.jobs, effort.scheduler)
+        records = run_in_folder(runs, out, effort.jobs, effort.scheduler)
     board = rank_solvers(instances, records, shipped=shipped)
     page = make_leaderboard_page(board, name, chosen.title, effort.evaluations)
     problems = [{"name": "gaitbench", "options": {"instance": id}} for id in instances]

@@ -16,8 +16,7 @@ from compare.cli.printing import Output, Rows, describe_command, say, say_error,
 from compare.report import write_report
 from compare.study.import_runs import read_imported_records
 from compare.study.record import RunRecord
-from compare.study.run import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop
-from compare.study.settings import SolverSpec, StudySettings, read_settings
+from compare.study.run import GRADIENT_SOLVERS, IPOPT, Handling, Run, Stop, plan_runs
 from compare.study.study import Study, read_study_file, run_study, write_command
 from metaheuristics import list_installed_algorithms
 from nlp_gait.backends.kernel.compiled import available_cores
@@ -39,29 +38,14 @@ class SearchOptions:
     evaluations: options.Evaluations = 10_000
     handling: str = "deb"
     time_limit: Annotated[float | None, Option(min=0.001, max=1000000000.0)] = None
-    polish: Annotated[bool, Option("--polish")] = False
 
-    def make_study(self, problems: Sequence[ProblemSpec], algorithms: str, starts: int) -> StudySettings:
-        """Return the study of problems by IPOPT and the named solvers; InputError unless a penalty has a weight."""
+    def make_handling(self) -> Handling:
+        """Return the constraint handling; raises InputError unless a penalty has a weight."""
         name, _, weight = self.handling.partition("=")
         if (name == "penalty") != bool(weight):
             raise InputError("--handling penalty=WEIGHT has a weight, others none; no weight suits every problem")
         settings = {"weight": options.parse_number("the weight", weight, "--handling")} if weight else {}
-        return StudySettings(
-            problems=tuple(problems),
-            solvers=tuple(
-                SolverSpec(name=solver, polish=self.polish and solver not in GRADIENT_SOLVERS)
-                for solver in list_solver_names(algorithms, starts)
-            ),
-            runs=self.runs,
-            starts=max(starts, 1),
-            handling=Handling(name=name, settings=settings),
-            stop=Stop(evaluations=self.evaluations, time_limit_s=self.time_limit),
-            seed=self.seed,
-        )
-
-
-DEFAULTS = SearchOptions(), options.ProblemOptions()
+        return Handling(name=name, settings=settings)
 
 
 def list_solver_names(algorithms: str, starts: int) -> list[str]:
@@ -83,7 +67,6 @@ def compare(
     starts: Annotated[int, Option(min=0, max=100000)] = STARTS,
     searches: SearchOptions,
     changes: options.ProblemOptions,
-    config: Path | None = None,
     out: Annotated[Path, OUTPUT] = options.RESULTS,
     jobs: options.Jobs = None,
     scheduler: options.Scheduler = None,
@@ -94,20 +77,21 @@ def compare(
     budget in the same folder extend it; runs whose algorithm, problem or robot was edited run again. Your own
     problems and algorithms are named as `FILE.py:NAME`, and a program in any language as `cmd:COMMAND`.
 
-    Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
-    `nlp-gait compare nao-ssp --algorithms pso --starts 0 --runs 1`,
-    `nlp-gait compare --config study.toml --out study`
+    Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --out study`,
+    `nlp-gait compare nao-ssp --algorithms pso --starts 0 --runs 1`
     """
-    if config is not None:
-        if (problems, algorithms, starts, searches, changes) != (None, ALGORITHMS, STARTS, *DEFAULTS):
-            raise InputError("--config has the problems, the solvers and their effort; leave out the options for them")
-        settings = read_settings(config)
-    else:
-        specs = [changes.make_spec(name) for name in problems or DEFAULT_PROBLEMS]
-        settings = searches.make_study(specs, algorithms, starts)
+    runs = plan_runs(
+        [changes.make_spec(name) for name in problems or DEFAULT_PROBLEMS],
+        [("", name) for name in list_solver_names(algorithms, starts)],
+        runs=searches.runs,
+        starts=starts,
+        handling=searches.make_handling(),
+        stop=Stop(evaluations=searches.evaluations, time_limit_s=searches.time_limit),
+        seed=searches.seed,
+    )
     if stderr.is_terminal:
         say(f"watch it: nlp-gait report {out} --watch")
-    records = run_in_folder(settings, out, jobs, scheduler)
+    records = run_in_folder(runs, out, jobs, scheduler)
     records += read_imported_records(out, records)
     written = write_report(out, records, read_study_file(out))
     comparisons = compare_problems(records, folder=out)
@@ -125,13 +109,11 @@ def compare(
     )
 
 
-def run_in_folder(settings: StudySettings, out: Path, jobs: int | None, scheduler: str | None) -> list[RunRecord]:
+def run_in_folder(runs: tuple[Run, ...], out: Path, jobs: int | None, scheduler: str | None) -> list[RunRecord]:
     """Run a study in a folder, and return all records, also of earlier commands."""
-    study = Study(
-        runs=settings.make_runs(), folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
-    )
+    study = Study(runs=runs, folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler)
     study.check()  # before the folder names it
-    write_command(out, settings, describe_command())
+    write_command(out, describe_command())
     gaps = LiveGaps()
     with show_progress("runs", len(study.runs), "building and compiling") as advance:
         try:

@@ -55,9 +55,8 @@ def assign_looks(names: Collection[str]) -> dict[str, Look]:
     used: Counter[str] = Counter()
     looks: dict[str, Look] = {}
     for name in sorted({*names, *_STUDIED.get()}, key=lambda name: (name.lower() not in COLOURS, name)):
-        # A polished search has its search's colour; an unknown solver gets the least used one.
-        usual = COLOURS.get(name.lower()) or COLOURS.get(name.lower().split("+")[0])
-        colour = usual or min((c for c in COLOURS.values() if c != INK), key=lambda c: used[c])
+        # An unknown solver gets the least used colour.
+        colour = COLOURS.get(name.lower()) or min((c for c in COLOURS.values() if c != INK), key=lambda c: used[c])
         looks[name] = Look(colour=colour, line=LINES[used[colour] % len(LINES)])
         used[colour] += 1
     return {name: looks[name] for name in names}

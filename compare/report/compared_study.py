@@ -18,7 +18,7 @@ from compare.drawing.figures import share_looks
 from compare.report.latex import format_latex_overview, format_latex_table
 from compare.report.study_report import write_report
 from compare.study.record import RunRecord, make_frame
-from compare.study.run import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Run, Stop
+from compare.study.run import IPOPT, ProblemSpec, Stop, plan_runs
 from compare.study.study import Study, StudyFile, run_study
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
@@ -116,18 +116,7 @@ def compare(
     if starts and all(solver != IPOPT for _, solver in given):
         given.insert(0, ("", IPOPT))
     listed = [problems] if isinstance(problems, (str, GaitProblem, ProblemSpec)) else problems
-    planned = [
-        Run(
-            problem=problem if isinstance(problem, ProblemSpec) else ProblemSpec(name=problem),
-            solver=solver,
-            label=label,
-            stop=Stop(evaluations=evaluations),
-            seed=seed,
-            number=run,
-        )
-        for problem in listed
-        for label, solver in given
-        for run in range(starts if solver in GRADIENT_SOLVERS else runs)
-    ]
-    study = Study(runs=tuple(planned), folder=None if out is None else Path(out), jobs=jobs)
+    specs = [problem if isinstance(problem, ProblemSpec) else ProblemSpec(name=problem) for problem in listed]
+    planned = plan_runs(specs, given, runs=runs, starts=starts, stop=Stop(evaluations=evaluations), seed=seed)
+    study = Study(runs=planned, folder=None if out is None else Path(out), jobs=jobs)
     return ComparedStudy(records=run_study(study))

@@ -27,7 +27,7 @@ from compare.report.study_sections import (
 )
 from compare.report.writing import write_document
 from compare.study.record import RunRecord, load_gait
-from compare.study.study import FILE, RECORDS, StudyFile, name_group, read_records, read_study_file
+from compare.study.study import RECORDS, StudyFile, name_group, read_records, read_study_file
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_file_name, replace_nan, write_json, write_text
 
@@ -124,11 +124,8 @@ def _describe_command(file: StudyFile, records: Sequence[RunRecord]) -> tuple[st
 
 
 def _describe_progress(file: StudyFile, records: Sequence[RunRecord]) -> tuple[str, ...]:
-    """Return a sentence while runs of the latest command, or of the solvers in the report, are missing."""
-    shown = {(record.problem, record.solver) for record in records}
-    if (settings := file.read_settings(FILE)) is not None:
-        shown |= {(run.problem.title, run.title) for run in settings.make_runs()}
-    groups = {name_group(*titles) for titles in shown}
+    """Return a sentence while runs of the solvers in the report are missing."""
+    groups = {name_group(record.problem, record.solver) for record in records}
     planned = sum(name.rsplit("-", 2)[0] in groups for name in file.runs)
     finished = len(records)
     return (f"{finished} of {planned} runs have ended; all numbers are of these.",) if finished < planned else ()

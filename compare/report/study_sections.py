@@ -261,7 +261,7 @@ def make_settings_section(comparisons: Sequence[Comparison], file: StudyFile) ->
         make_solver_table(record for comparison in comparisons for record in comparison.records),
         make_text_table(("problem", "changed values", "options"), options, prose=True),
         "Objective and constraints count separately where they are called separately, so gradient methods are never favoured; a "
-        "gradient run reaches its targets at its end. A polished run includes the cost of its search. Times are wall times of "
+        "gradient run reaches its targets at its end. Times are wall times of "
         "the solve, without building or compiling.",
         make_version_table(file.command, file.date, (r.versions for c in comparisons for r in c.records)),
         make_citation_section(problems.values()),

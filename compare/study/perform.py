@@ -149,13 +149,10 @@ class IsolatedRun:
         return catch_errors(self.run, self.inputs, lambda: judge_search(self.run, self.inputs, end))
 
 
-def perform(run: Run, inputs: Inputs, search: RunRecord | None, _: Send | None = None) -> RunRecord:
-    """Perform a run of a solver of this package; whatever fails in it becomes its record.
-
-    ``search`` is the record of the search that IPOPT continues, if it was run before.
-    """
-    if not run.is_search or (run.polish and search is not None):
-        return catch_errors(run, inputs, lambda: run_solver(run, inputs, search))
+def perform(run: Run, inputs: Inputs, _: Send | None = None) -> RunRecord:
+    """Perform a run of a solver of this package; whatever fails in it becomes its record."""
+    if not run.is_search:
+        return catch_errors(run, inputs, lambda: run_solver(run, inputs))
     return catch_errors(run, inputs, lambda: judge_search(run, inputs, run_search(run, inputs)))
 
 
@@ -277,14 +274,11 @@ def choose_entries(best: Sequence[float | None]) -> list[int]:
     return sorted({*changes[:: math.ceil(len(changes) / MOST_HISTORY)], len(best) - 1})
 
 
-def run_solver(run: Run, inputs: Inputs, search: RunRecord | None = None) -> RunRecord:
-    """Run an NLP solver: from the given start, from the end of a search that it continues, or from a random point."""
+def run_solver(run: Run, inputs: Inputs) -> RunRecord:
+    """Run an NLP solver, from the given start or from a random point."""
     started = time.perf_counter()
     problem, solver = run.problem.load(), run.make_solver()
-    if search is not None and not search.x:
-        raise InputError(f"the search has no point to polish: {search.status}")
-    start = run.start if search is None else search.x
-    x0 = problem.check_within(start) if start else problem.start_point(np.random.default_rng(run.run_seed))
+    x0 = problem.check_within(run.start) if run.start else problem.start_point(np.random.default_rng(run.run_seed))
     outcome = solver.prepare(problem, PLANNED_RUNS).run(problem, x0)
     prepared_s = time.perf_counter() - started - outcome.time_s
     compile_s = min(outcome.compile_s, prepared_s)  # less where the process had the solver already
@@ -292,16 +286,10 @@ def run_solver(run: Run, inputs: Inputs, search: RunRecord | None = None) -> Run
     if outcome.linear_solver:
         settings["linear_solver"] = outcome.linear_solver
     solution = make_solution(problem, [outcome])
-    counts, history, calls, seconds = outcome.evaluations.by_kind(), list[Best](), 0, 0.0
-    if search is not None:
-        calls, seconds = search.counts["f"], search.time_s.solve
-        counts["f"] += calls
-        history += map(Best, search.history.evaluations, search.history.objective, search.time_s.history)
-        settings = {**search.settings, IPOPT: settings}
     # A solver that keeps no history has its end.
     end = Best(outcome.evaluations.f, outcome.objective if outcome.claimed else None, outcome.time_s)
-    history += (Best(calls + b.calls, b.objective, seconds + b.time_s) for b in outcome.history or (end,))
-    history = [history[k] for k in choose_entries([best.objective for best in history])]
+    course = outcome.history or (end,)
+    history = [course[k] for k in choose_entries([best.objective for best in course])]
     judged = describe_evaluation(evaluate(problem, outcome.x, prove=False))
     return make_record(
         run,
@@ -309,7 +297,7 @@ def run_solver(run: Run, inputs: Inputs, search: RunRecord | None = None) -> Run
         Times(
             build=prepared_s - compile_s,
             compile=compile_s,
-            solve=seconds + outcome.time_s,
+            solve=outcome.time_s,
             objective=outcome.objective_s,
             history=tuple(best.time_s for best in history),
         ),
@@ -319,8 +307,7 @@ def run_solver(run: Run, inputs: Inputs, search: RunRecord | None = None) -> Run
         x=problem.by_name(outcome.x),
         reported_objective=judged["objective"] if math.isfinite(judged["objective"]) else None,
         **judged,
-        counts=counts,
-        failed_evaluations=0 if search is None else search.failed_evaluations,
+        counts=outcome.evaluations.by_kind(),
         iterations=outcome.iterations,
         active_constraints=solution.active_constraints,
         history=History(

@@ -36,7 +36,7 @@ from nlp_gait.notebook import import_pandas
 T = TypeVar("T")
 K = TypeVar("K")
 
-SCHEMA = 6
+SCHEMA = 7
 REMEDY = "delete it to have the run repeated"
 CALLS = tuple(kind.name for kind in fields(Evaluations))
 PACKAGES = ("casadi", "numpy", "scipy", "cma", "pymoo", "distributed")

@@ -22,7 +22,7 @@ from nlp_gait.backends.identity import hash_formulas, hash_json, identify_proble
 from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solver
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.files import replace_nan
+from nlp_gait.files import LARGEST_INTEGER, check_plain, replace_nan
 from nlp_gait.formulation import GaitProblem, Objective
 from nlp_gait.formulation.registry import check_options, find_maker, hash_files, load
 from nlp_gait.gaitbench.generated import resolve_name
@@ -151,14 +151,13 @@ class Inputs:
     code: str = ""  #: hash of the files of a user-defined solver
     handling: Handling | None = None  #: of a search
     stop: Mapping[str, Any] = field(default_factory=dict)  #: criteria that the solver heeds, as in ``Stop``
-    polish: bool = False  #: whether IPOPT continues from the end of the search
     start: Mapping[str, float] = field(default_factory=dict)  #: of an NLP solver; empty for a random point
     imported: str = ""  #: hash of imported values; empty for a run of ours
 
     @property
     def is_search(self) -> bool:
         """Whether the run ends with a search, so that its history is exact."""
-        return self.handling is not None and not self.polish
+        return self.handling is not None
 
     @cached_property
     def key(self) -> str:
@@ -181,7 +180,6 @@ class Run:
     seed: int = 0  #: of the study
     number: int = 0  #: its seed is ``seed + number``, so that equal runs of all solvers start alike
     label: str = ""  #: of the solver in the study; empty for its name
-    polish: bool = False  #: whether IPOPT continues from the end of a search
     #: Values of all variables by name at which an NLP solver starts; empty for a random point
     start: Mapping[str, float] = field(default_factory=dict)
 
@@ -227,11 +225,26 @@ class Run:
 
     def make_solver(self) -> Solver:
         """Return the NLP solver with settings and the limits that it respects; InputError for what it does not allow."""
-        name, settings = (IPOPT, {}) if self.polish else (str(self.solver), self.settings)
-        setting_names = list_settings(name)
+        setting_names = list_settings(str(self.solver))
         limits = {"evaluations": self.stop.evaluations, "time_limit_s": self.stop.time_limit_s}
         respected = {limit: value for limit, value in limits.items() if limit in setting_names and value is not None}
-        return make_solver(name, **{**respected, **settings})
+        return make_solver(str(self.solver), **{**respected, **self.settings})
+
+
+def plan_runs(
+    problems: Iterable[ProblemSpec], solvers: Iterable[tuple[str, Any]], *, runs: int, starts: int, **common: Any
+) -> tuple[Run, ...]:
+    """Return the runs of a study: on each problem ``starts`` of each NLP solver, and ``runs`` of each search.
+
+    ``solvers`` are labels, which may be empty, with solvers; ``common`` are further fields of all runs, such as ``stop``.
+    """
+    pairs = list(solvers)
+    return tuple(
+        Run(problem=problem, solver=solver, label=label, number=number, **common)
+        for problem in problems
+        for label, solver in pairs
+        for number in range(starts if solver in GRADIENT_SOLVERS else runs)
+    )
 
 
 def make_inputs(runs: Iterable[Run]) -> list[Inputs]:
@@ -264,7 +277,6 @@ def _make_inputs(run: Run, problem: GaitProblem, identity: dict[str, Any], solve
         code=code,
         handling=run.handling if run.is_search else None,
         stop=limits,
-        polish=run.polish,
         start=dict(run.start),
     )
 
@@ -274,9 +286,8 @@ def _describe_solver(run: Run) -> dict[str, Any]:
         run.solver if isinstance(run.solver, str) else {**describe_settings(run.solver), **_hash_source(run.solver)}
     )
     try:
-        plain: dict[str, Any] = json.loads(
-            json.dumps({"solver": solver, "settings": dict(run.settings)}, allow_nan=False)
-        )
+        plain: dict[str, Any] = json.loads(json.dumps({"solver": solver, "settings": dict(run.settings)}))
+        check_plain(plain)
     except (TypeError, ValueError) as error:
         raise InputError(f"settings of {run.title!r} must be numbers, texts and lists: {error}") from error
     return plain
@@ -296,9 +307,11 @@ def check_run(run: Run) -> None:
         raise unknown("algorithm", run.solver, [*list_solvers(), *find_entry_points("algorithm")])
     if run.stop.time_limit_s is not None and not run.stop.time_limit_s > 0.0:
         raise InputError(f"time_limit_s must be > 0, got {run.stop.time_limit_s}")
-    if run.polish or not run.is_search:
+    if run.run_seed > LARGEST_INTEGER:
+        raise InputError(f"the seed {run.run_seed} of run {run.number} exceeds 64 bits")
+    if not run.is_search:
         run.make_solver().check(problem)
-    if run.is_search:
+    else:
         make_handling(run.handling.name, **run.handling.settings)
         search = UNREAD if run.is_user_code else run.make_search()
         check_budget(search, run.stop.evaluations)

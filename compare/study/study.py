@@ -1,8 +1,8 @@
 """A study: solvers x problems x runs, one record for each finished run, in a folder.
 
 ``records/<problem>/<solver>-<run>-<key>.json`` is the record of a run; the key is the hash of its inputs, so runs with different
-settings never overwrite each other, and a run with the same inputs is read instead of repeated. ``study.json`` has the settings
-and lists the runs that belong to the study; other records stay and are not read.
+settings never overwrite each other, and a run with the same inputs is read instead of repeated. ``study.json`` lists the runs of
+the study; other records stay and are not read.
 """
 
 import logging
@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from compare.study.perform import (
     MOST_REASON,
@@ -24,9 +24,8 @@ from compare.study.perform import (
     make_failed,
     perform,
 )
-from compare.study.record import RunRecord, check_readable, format_now, read_record
+from compare.study.record import RunRecord, format_now, read_record
 from compare.study.run import Inputs, ProblemSpec, Run, check_repeatable, check_run, make_inputs
-from compare.study.settings import StudySettings, parse_settings
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError, OutputError, WorkerError
@@ -37,23 +36,17 @@ from nlp_gait.processes import Job, has_fork, run_jobs
 FILE, RECORDS = "study.json", "records"
 CONNECT_TIMEOUT = "10s"  # to a Dask scheduler
 REMEDY = "delete it; the records stay valid"
-Item = tuple[Run, Inputs, RunRecord | None]
-"""A run, its inputs, and the record of the search that it polishes."""
+Item = tuple[Run, Inputs]
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyFile:
     """Content of ``study.json``."""
 
-    schema: Literal[3] = 3
+    schema: Literal[4] = 4
     command: str = ""  #: that ran last
     date: str = ""  #: of it, UTC
-    study: Mapping[str, Any] | None = None  #: its settings; None without one
     runs: tuple[str, ...] = ()  #: that belong to the study: names of their records without suffix
-
-    def read_settings(self, source: str) -> StudySettings | None:
-        """Return the settings; raises InputError, with the source in front, if they are damaged."""
-        return None if self.study is None else parse_settings(self.study, source, runs_code=False)
 
 
 def read_study_file(folder: Path) -> StudyFile:
@@ -66,10 +59,10 @@ def read_study_file(folder: Path) -> StudyFile:
         return decode(StudyFile, raw)
 
 
-def write_command(folder: Path, settings: StudySettings, command: str) -> None:
-    """Write the settings and the command of a study; raises InputError if its file is damaged, and OutputError."""
+def write_command(folder: Path, command: str) -> None:
+    """Write the command of a study; raises InputError if its file is damaged, and OutputError."""
     with lock_folder(folder):
-        file = replace(read_study_file(folder), study=settings.to_json(), command=command, date=format_now())
+        file = replace(read_study_file(folder), command=command, date=format_now())
         write_json(folder / FILE, asdict(file))
 
 
@@ -193,10 +186,6 @@ class Study:
         for problem in {run.problem.title: run.problem for run in self.runs}.values():
             check_repeatable(problem)
 
-    def name_run(self, run: Run, inputs: Inputs) -> str:
-        """Return the name of a run's record without suffix."""
-        return name_run(run.problem.title, run.title, run.number, inputs)
-
 
 def run_study(
     study: Study,
@@ -221,11 +210,6 @@ def run_study(
     """
     study.check()
     inputs = make_inputs(study.runs)
-    for run, given in {
-        (r.problem.title, r.title): (r, given) for r, given in zip(study.runs, inputs, strict=True)
-    }.values():
-        with convert_errors(f"{run.title} on {run.problem.title}: its records could not be read", InputError):
-            check_readable(make_failed(run, given, "not run"))
     records = _read_finished(study, inputs)
     on_stored(len(records))
     remedy = "rerun the same command to continue"
@@ -250,7 +234,7 @@ def _read_finished(study: Study, inputs: Sequence[Inputs]) -> dict[int, RunRecor
     """Return the records by index of the run; list the runs."""
     if study.folder is None:
         return {}
-    names = [study.name_run(run, given) for run, given in zip(study.runs, inputs, strict=True)]
+    names = [name_run(r.problem.title, r.title, r.number, i) for r, i in zip(study.runs, inputs, strict=True)]
     paths = [study.folder / RECORDS / f"{name}.json" for name in names]
     for folder in {path.parent for path in paths}:
         make_writable_folder(folder)
@@ -261,28 +245,23 @@ def _read_finished(study: Study, inputs: Sequence[Inputs]) -> dict[int, RunRecor
 def _run_missing(
     study: Study, inputs: Sequence[Inputs], records: Mapping[int, RunRecord]
 ) -> Iterator[tuple[int, RunRecord]]:
-    """Run what has no record, what polishes a search last; yield the indices and records as runs finish."""
+    """Run what has no record; yield the indices and records as runs finish."""
     waiting = [index for index in range(len(study.runs)) if index not in records]
-    if study.scheduler is None:
-        _prepare([study.runs[index] for index in waiting])
     # Long runs first, to balance the load; and runs of all problems in turn.
     waiting.sort(key=lambda index: (study.runs[index].is_search, study.runs[index].number))
-    plain, polished = ([k for k in waiting if study.runs[k].polish == polish] for polish in (False, True))
-    for position, record in _run_items([(study.runs[k], inputs[k], None) for k in plain], study):
-        yield plain[position], record
-    searches = {record.inputs.key: record for record in records.values()}
-    before = {k: replace(inputs[k], polish=False) for k in polished}
-    alone = [k for k in polished if before[k].key not in searches]  # without their search in the study
-    items: list[Item] = [(replace(study.runs[k], polish=False), before[k], None) for k in alone]
-    searches.update((before[alone[position]].key, record) for position, record in _run_items(items, study))
-    items = [(study.runs[k], inputs[k], searches[before[k].key]) for k in polished]
-    for position, record in _run_items(items, study):
-        yield polished[position], record
+    items = [(study.runs[index], inputs[index]) for index in waiting]
+    if study.scheduler is None:
+        _prepare([run for run, _ in items])
+        results = _run_here(items, study.jobs)
+    else:
+        results = _run_on_cluster(items, study.scheduler)
+    for position, record in results:
+        yield waiting[position], record
 
 
 def _prepare(runs: Sequence[Run]) -> None:
     """Compile once what pays for many runs: forks have it, other processes find it in the cache folder."""
-    for run in {(r.problem.title, r.title): r for r in reversed(runs) if r.polish or not r.is_search}.values():
+    for run in {(r.problem.title, r.title): r for r in reversed(runs) if not r.is_search}.values():
         with suppress(GaitError):  # the records of the runs report it
             run.make_solver().prepare(run.problem.load(), PLANNED_RUNS)
     if any(run.is_user_code for run in runs):
@@ -293,28 +272,25 @@ def _prepare(runs: Sequence[Run]) -> None:
             compile_objective(problem.load(), threads=1)
 
 
-def _run_items(items: Sequence[Item], study: Study) -> Iterator[tuple[int, RunRecord]]:
+def _run_here(items: Sequence[Item], workers: int) -> Iterator[tuple[int, RunRecord]]:
     """Run items in any order, and yield the position and the record of each as it finishes."""
-    if study.scheduler is not None:
-        yield from _run_on_cluster(items, study.scheduler)
-        return
     jobs, isolated, places = list[Job](), dict[int, IsolatedRun](), list[int]()
-    for position, (run, inputs, search) in enumerate(items):
-        is_isolated = run.is_user_code and not run.polish and has_fork()
+    for position, (run, inputs) in enumerate(items):
+        is_isolated = run.is_user_code and has_fork()
         movable = has_fork() or isinstance(run.problem.name, str)
-        if not is_isolated and (study.jobs == 1 or not movable):
+        if not is_isolated and (workers == 1 or not movable):
             with count_interrupts() as presses:
-                record = perform(run, inputs, search)
+                record = perform(run, inputs)
                 if presses:  # user code has swallowed it
                     raise KeyboardInterrupt
             yield position, record
             continue
         if is_isolated:
             isolated[len(jobs)] = IsolatedRun(run=run, inputs=inputs)
-        jobs.append(isolated[len(jobs)].make_job() if is_isolated else Job(call=partial(perform, run, inputs, search)))
+        jobs.append(isolated[len(jobs)].make_job() if is_isolated else Job(call=partial(perform, run, inputs)))
         places.append(position)
-    for number, result in run_jobs(jobs, study.jobs):
-        run, inputs, _ = items[places[number]]
+    for number, result in run_jobs(jobs, workers):
+        run, inputs = items[places[number]]
         if isinstance(result, ChangedFileError):
             raise result
         if number in isolated:
@@ -356,7 +332,7 @@ def _run_on_cluster(items: Sequence[Item], scheduler: str) -> Iterator[tuple[int
             ) from error
 
 
-def _perform_there(folder: str, run: Run, inputs: Inputs, search: RunRecord | None) -> RunRecord:
+def _perform_there(folder: str, run: Run, inputs: Inputs) -> RunRecord:
     if os.path.isdir(folder):
         os.chdir(folder)
     (there,) = make_inputs([run])
@@ -364,4 +340,4 @@ def _perform_there(folder: str, run: Run, inputs: Inputs, search: RunRecord | No
         raise WorkerError(
             "a worker has another version of nlp-gait or of your files than this machine; install the same"
         )
-    return perform(run, inputs, search)
+    return perform(run, inputs)

@@ -11,7 +11,6 @@ from compare.analysis.comparison import compare_problems
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
 from compare.bench import baseline
 from compare.study.record import RunRecord
-from compare.study.settings import SolverSpec
 from compare.study.study import Study, run_study
 from nlp_gait.errors import InputError
 
@@ -21,9 +20,8 @@ ID = "walk12-w015"
 @pytest.fixture(scope="module")
 def runs() -> list[RunRecord]:
     """A few runs of three solvers, the last of which finds nothing."""
-    solvers = (SolverSpec(name="pso"), SolverSpec(name="ipopt"), SolverSpec(name="random"))
-    study = baseline.make_bench_study([ID], *solvers, runs=3, evaluations=1000)
-    records = run_study(Study(runs=study.make_runs()))
+    planned = baseline.plan_bench_runs([ID], dict.fromkeys(("pso", "ipopt", "random"), ""), runs=3, evaluations=1000)
+    records = run_study(Study(runs=planned))
     infeasible = [
         replace(r, objective=math.nan, violation=1.0, feasible=False) for r in records if r.solver == "random"
     ]

@@ -67,7 +67,7 @@ def test_a_page_for_each_command_with_every_option(tmp_path: Path) -> None:
             assert all(flag in page for flag in flags), (name, flags)
     compare = (tmp_path / "commands" / "compare.md").read_text(encoding="utf-8")
     assert "| `--runs` `INTEGER` | Runs of each search algorithm. Default: `11`. |" in compare
-    assert "nlp-gait compare --config study.toml --out study" in compare
+    assert "nlp-gait compare nao-ssp --algorithms pso --starts 0 --runs 1" in compare
 
 
 def test_every_algorithm_and_solver_is_described(tmp_path: Path) -> None:

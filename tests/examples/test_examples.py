@@ -17,8 +17,6 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.study.settings import read_settings
-from compare.study.study import Study
 
 ROOT = Path(__file__).parents[2]
 MOST_LINES = 60  # of code
@@ -106,10 +104,3 @@ def test_a_paper_of_two_files_is_reproduced_by_the_command(tmp_path: Path) -> No
 def test_the_three_kinds_of_user_code(capsys: pytest.CaptureFixture[str]) -> None:
     runpy.run_path(str(ROOT / "examples" / "bring_your_own.py"), run_name="__main__")
     assert "annealing, 2000 evaluations: power " in capsys.readouterr().out
-
-
-def test_the_study_file_can_run() -> None:
-    settings = read_settings(ROOT / "examples" / "study.toml")
-    study = Study(runs=settings.make_runs())
-    study.check()
-    assert len(study.runs) == 2 * (31 + 31 + 2 * 31 + 31 + 11)

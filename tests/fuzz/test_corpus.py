@@ -11,8 +11,7 @@ from typer.testing import CliRunner
 from compare.cli import app
 from compare.study.memo import KEY_DIGITS, Memo
 from compare.study.record import read_record
-from compare.study.settings import read_settings
-from compare.study.study import FILE, Study, read_study_file
+from compare.study.study import FILE, read_study_file
 from metaheuristics import SearchError
 from nlp_gait import __version__
 from nlp_gait.backends.identity import hash_json
@@ -47,7 +46,7 @@ def read_a_record(path: Path) -> None:
 
 
 def read_a_study(path: Path) -> None:
-    read_study_file(path.parent).read_settings("study")
+    read_study_file(path.parent)
 
 
 def read_a_urdf(path: Path) -> None:
@@ -70,7 +69,6 @@ FORMATS = {
     "result": ("result.json", read_a_result),
     "record": ("record.json", read_a_record),
     "manifest": (FILE, read_a_study),
-    "study": ("study.toml", lambda path: Study(runs=read_settings(path).make_runs()).check()),
     "robot": ("robot.json", lambda path: load_robot(str(path))),
     "urdf": ("robot.urdf", read_a_urdf),
     "biped": ("robot.urdf", lambda path: make_biped_model(load_robot(str(path)))),
@@ -116,7 +114,7 @@ def test_the_name_of_a_damaged_file_says_what_becomes_of_it(path: Path, tmp_path
 
 @of_every_format
 def test_valid_files_are_accepted_and_other_versions_are_not(name: str, tmp_path: Path) -> None:
-    """Results and studies are written by hand, too: without a version they are the first."""
+    """Results are written by hand, too: without a version they are the first."""
     path = prepare(name, tmp_path)
     for data in list_seeds(name):
         path.write_bytes(data)
@@ -129,7 +127,7 @@ def test_valid_files_are_accepted_and_other_versions_are_not(name: str, tmp_path
         path.write_bytes(data.replace(b"schema", b"scheme", 1))
         assert judge(name, path).startswith("refused")
         path.write_bytes(SCHEMA.sub(b"", data, count=1))
-        assert judge(name, path) == "accepted" or name not in ("result", "study")
+        assert judge(name, path) == "accepted" or name != "result"
 
 
 REASONS = {

@@ -14,8 +14,6 @@ from compare.cli.printing import PlainConsole, escape_controls
 from compare.drawing.figures import inline_svg, make_figure, render_svg, use_style
 from compare.report.study_report import make_study_document
 from compare.report.writing import render_markdown, render_page
-from compare.study.run import ProblemSpec
-from compare.study.settings import SolverSpec, StudySettings
 from compare.study.study import StudyFile
 from tests.compare.records import study
 
@@ -58,8 +56,7 @@ def hostile_report() -> tuple[Page, str]:
                 active_constraints=tuple(replace(a, name=MARKED, unit=MARKED) for a in record.active_constraints),
             )
         )
-    settings = StudySettings(problems=(ProblemSpec(name="walk", label=MARKED),), solvers=(SolverSpec(name=MARKED),))
-    file = StudyFile(command=f"nlp-gait compare --out '{MARKED}'", date=MARKED, study=settings.to_json())
+    file = StudyFile(command=f"nlp-gait compare --out '{MARKED}'", date=MARKED)
     document = make_study_document(compare_problems(records), file)
     page = Page()
     page.feed(render_page(document))

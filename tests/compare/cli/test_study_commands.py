@@ -12,27 +12,14 @@ from tests.compare.cli.calls import as_json, nlp_gait
 
 pytestmark = pytest.mark.usefixtures("coarse_pages")
 
-STUDY = """
-runs = 1
-starts = 1
-evaluations = 300
-[[problem]]
-name = "walk12"
-[[solver]]
-name = "ipopt"
-[[solver]]
-name = "pso"
-label = "little-pso"
-settings = {population = 20}
-"""
+STUDY = "compare walk12 --algorithms pso --runs 1 --starts 1 --evaluations 300 --jobs 1".split()
 
 
 @pytest.fixture(scope="module")
 def folder(coarse_pages: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("study")
-    (out / "study.toml").write_text(STUDY)
-    done = as_json("compare", "--config", out / "study.toml", "--out", out / "out", "--jobs", "1")
-    assert [s["solver"] for s in done["problems"]["walk12"]] == ["ipopt", "little-pso"]
+    done = as_json(*STUDY, "--out", out / "out")
+    assert [s["solver"] for s in done["problems"]["walk12"]] == ["ipopt", "pso"]
     assert all(Path(file).stat().st_size for file in done["files"])
     return out / "out"
 
@@ -40,19 +27,19 @@ def folder(coarse_pages: None, tmp_path_factory: pytest.TempPathFactory) -> Path
 def test_the_same_command_keeps_everything(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = {path: path.stat().st_mtime_ns for path in folder.glob("records/*/*.json")}
     assert len(before) == 2
-    arguments = ["compare", "--config", str(folder.parent / "study.toml"), "--out", str(folder), "--jobs", "1"]
+    arguments = [*STUDY, "--out", str(folder)]
     monkeypatch.setattr(sys, "argv", ["nlp-gait", *arguments])  # which the study records
     nlp_gait(*arguments)
     assert {path: path.stat().st_mtime_ns for path in folder.glob("records/*/*.json")} == before
     study = json.loads((folder / "study.json").read_text())
-    assert "--config" in study["command"] and study["date"] and len(study["runs"]) == 2
+    assert "walk12" in study["command"] and study["date"] and len(study["runs"]) == 2
 
 
 def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path) -> None:
     shutil.copytree(folder / "records", tmp_path / "records")
     files = as_json("report", str(tmp_path))["files"]
     assert (tmp_path / "report.html").as_posix() in files
-    assert "little-pso" in (tmp_path / "report.md").read_text()
+    assert "pso" in (tmp_path / "report.md").read_text()
 
 
 def test_all_are_the_installed_searches_and_both_gradient_methods(monkeypatch: pytest.MonkeyPatch) -> None:

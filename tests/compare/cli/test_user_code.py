@@ -1,6 +1,5 @@
 """User code: a problem, a search and a plain function in one file, in every command by ``file.py:name``."""
 
-import json
 import shutil
 from pathlib import Path
 
@@ -9,19 +8,10 @@ import pytest
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "bring_your_own.py"
-STUDY = """
-runs = 1
-starts = 1
-evaluations = 300
-[[problem]]
-name = "my.py:two_link"
-options = {intervals = 10}
-fix = {time_s = 1.5}
-[[solver]]
-name = "my.py:Shrinking"
-settings = {population = 10}
-polish = true
-"""
+STUDY = (
+    "compare my.py:two_link --set intervals=10 --set time_s=1.5 --algorithms my.py:Shrinking --starts 0 --runs 1 "
+    "--evaluations 300 --out study --jobs 1"
+).split()
 
 
 @pytest.fixture
@@ -46,16 +36,13 @@ def test_every_command_takes_them(mine: Path) -> None:
     assert "my.py" in one_sentence("solve", "my.py:three_link")
 
 
-def test_a_study_file_names_them_and_a_folder_does_not(mine: Path) -> None:
-    Path("study.toml").write_text(STUDY)
-    nlp_gait("compare", "--config", "study.toml", "--out", "study", "--jobs", "1")
+def test_a_command_names_them_and_a_folder_does_not(mine: Path) -> None:
+    nlp_gait(*STUDY)
     names = sorted(path.name for path in Path("study").glob("records/two_link/*.json"))
-    assert [name.rpartition("-")[0] for name in names] == ["Shrinking+ipopt-0000", "Shrinking-0000"]
-    (record,) = Path("study/records/two_link").glob("Shrinking-0000-*.json")
-    assert json.loads(record.read_text())["settings"]["population"] == 10
+    assert [name.rpartition("-")[0] for name in names] == ["Shrinking-0000"]
     nlp_gait("report", "study")
     mine.rename("moved.py")
-    assert "my.py" in one_sentence("compare", "--config", "study.toml", "--out", "study")
+    assert "my.py" in one_sentence(*STUDY)
     Path("moved.py").rename("my.py")
-    nlp_gait("compare", "--config", "study.toml", "--out", "study", "--jobs", "1")
+    nlp_gait(*STUDY)
     assert sorted(path.name for path in Path("study").glob("records/two_link/*.json")) == names

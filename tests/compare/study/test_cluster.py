@@ -6,14 +6,12 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from compare.study.record import RunRecord
-from compare.study.run import ProblemSpec, Stop
-from compare.study.settings import SolverSpec, StudySettings
+from compare.study.run import ProblemSpec, Stop, plan_runs
 from compare.study.study import Study, run_study
 from nlp_gait.errors import InputError, WorkerError
 from tests.compare.study.test_study import contents
@@ -21,12 +19,9 @@ from tests.extras import need
 
 need("distributed")
 
-STUDY = StudySettings(
-    problems=(ProblemSpec(name="walk12"),),
-    solvers=(SolverSpec(name="pso", polish=True), SolverSpec(name="ga")),
-    runs=3,
-    stop=Stop(evaluations=200),
-)
+WALK = ProblemSpec(name="walk12")
+SEARCHES = [("", "pso"), ("", "ga")]
+STOP = Stop(evaluations=200)
 
 
 def dask(folder: Path, *arguments: str) -> subprocess.Popen[bytes]:
@@ -79,7 +74,8 @@ def test_workers_find_user_code_and_killed_processes_lose_no_run(
     monkeypatch.chdir(tmp_path)
     Path("own.py").write_text(OWN)
     Path("helper.py").write_text("def draw(rng, lower, upper):\n    return rng.uniform(lower, upper)\n")
-    settings = replace(STUDY, solvers=(*STUDY.solvers, SolverSpec(name="own.py:search")))
+    own = ("", "own.py:search")
+    runs = plan_runs([WALK], [*SEARCHES, ("", "ipopt"), own], runs=3, starts=3, stop=STOP)
     with Client(address, timeout="60s") as client:
         client.wait_for_workers(2, timeout=60)
     finished: list[RunRecord] = []
@@ -89,9 +85,9 @@ def test_workers_find_user_code_and_killed_processes_lose_no_run(
             os.kill(workers[0].pid, signal.SIGKILL)
         finished.append(record)
 
-    run_study(Study(runs=settings.make_runs(), folder=tmp_path / "cluster", scheduler=address), progress=kill_a_worker)
+    run_study(Study(runs=runs, folder=tmp_path / "cluster", scheduler=address), progress=kill_a_worker)
     assert workers[0].wait(10) == -signal.SIGKILL and workers[1].poll() is None
-    run_study(Study(runs=settings.make_runs(), folder=tmp_path / "here"))
+    run_study(Study(runs=runs, folder=tmp_path / "here"))
     assert contents(tmp_path / "cluster") == contents(tmp_path / "here")
     finished.clear()
 
@@ -99,15 +95,16 @@ def test_workers_find_user_code_and_killed_processes_lose_no_run(
         scheduler.kill()
         finished.append(record)
 
-    more = replace(settings, solvers=(SolverSpec(name="own.py:search"),), runs=30, stop=Stop(evaluations=2000))
+    more = plan_runs([WALK], [own], runs=30, starts=1, stop=Stop(evaluations=2000))
     with pytest.raises(WorkerError, match="failed: .*; finished runs are stored: rerun the same command to continue"):
-        study = Study(runs=more.make_runs(), folder=tmp_path / "lost", scheduler=address)
+        study = Study(runs=more, folder=tmp_path / "lost", scheduler=address)
         run_study(study, progress=kill_the_scheduler)
-    assert 0 < len(finished) == len(list((tmp_path / "lost" / "records").rglob("*.json"))) < len(more.make_runs())
+    assert 0 < len(finished) == len(list((tmp_path / "lost" / "records").rglob("*.json"))) < len(more)
 
 
 @pytest.mark.filterwarnings("ignore")
 def test_no_scheduler_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.study.study.CONNECT_TIMEOUT", "1s")
     with pytest.raises(InputError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
-        run_study(Study(runs=STUDY.make_runs(), folder=tmp_path, scheduler="tcp://127.0.0.1:9"))
+        runs = plan_runs([WALK], SEARCHES, runs=1, starts=1, stop=STOP)
+        run_study(Study(runs=runs, folder=tmp_path, scheduler="tcp://127.0.0.1:9"))

@@ -4,26 +4,25 @@ import json
 import linecache
 import sys
 import types
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from compare.study.record import RunRecord
-from compare.study.run import Handling, ProblemSpec, Run, Stop, make_inputs
-from compare.study.settings import SolverSpec, StudySettings
+from compare.study.run import Handling, ProblemSpec, Run, Stop, make_inputs, plan_runs
 from compare.study.study import RECORDS, Study, read_records, read_study_file, run_study
+from metaheuristics import ParticleSwarm
 from tests.robots.custom import humanoid
 
-PSO, GA = SolverSpec(name="pso"), SolverSpec(name="ga")
-STUDY = StudySettings(problems=(ProblemSpec(name="walk12"),), solvers=(PSO, GA), runs=2, stop=Stop(evaluations=200))
+WALK, PSO, GA = ProblemSpec(name="walk12"), ("", "pso"), ("", "ga")
+STUDY = {"problems": [WALK], "solvers": [PSO, GA], "runs": 2, "starts": 1, "stop": Stop(evaluations=200)}
 
 
-def grow(folder: Path, settings: StudySettings) -> tuple[list[RunRecord], int]:
+def grow(folder: Path, **changes: Any) -> tuple[list[RunRecord], int]:
     """Return the records of a study, and how many of them were stored before."""
     stored: list[int] = []
-    records = run_study(Study(runs=settings.make_runs(), folder=folder), on_stored=stored.append)
+    records = run_study(Study(runs=plan_runs(**{**STUDY, **changes}), folder=folder), on_stored=stored.append)
     return records, stored[0]
 
 
@@ -32,11 +31,11 @@ def count_files(folder: Path) -> int:
 
 
 def test_more_runs_solvers_and_problems_continue_what_is_there(tmp_path: Path) -> None:
-    assert grow(tmp_path, STUDY)[1] == 0
-    assert grow(tmp_path, replace(STUDY, runs=4))[1] == 4
-    assert grow(tmp_path, replace(STUDY, solvers=(PSO, GA, SolverSpec(name="de"))))[1] == 4
+    assert grow(tmp_path)[1] == 0
+    assert grow(tmp_path, runs=4)[1] == 4
+    assert grow(tmp_path, solvers=[PSO, GA, ("", "de")])[1] == 4
     slow = ProblemSpec(name="walk12", label="slow", values={"lambda": 1.0})
-    assert grow(tmp_path, replace(STUDY, problems=(*STUDY.problems, slow)))[1] == 4
+    assert grow(tmp_path, problems=[WALK, slow])[1] == 4
     assert count_files(tmp_path) == 8 + 2 + 4
 
 
@@ -45,22 +44,21 @@ CHANGES: dict[str, dict[str, Any]] = {
     "target": {"stop": Stop(evaluations=200, target=0.99)},
     "seed": {"seed": 7},
     "handling": {"handling": Handling(name="epsilon")},
-    "settings": {"solvers": (SolverSpec(name="pso", settings={"population": 20}),)},
-    "parameter": {"problems": (ProblemSpec(name="walk12", values={"lambda": 0.5}),)},
-    "option": {"problems": (ProblemSpec(name="walk12", options={"intervals": 10}),)},
+    "settings": {"solvers": [("pso", ParticleSwarm(population=20))]},
+    "parameter": {"problems": [ProblemSpec(name="walk12", values={"lambda": 0.5})]},
+    "option": {"problems": [ProblemSpec(name="walk12", options={"intervals": 10})]},
 }
 
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_other_inputs_never_overwrite_a_run_and_the_report_shows_the_latest(change: str, tmp_path: Path) -> None:
     """The same command as before finds its runs again, and lists them."""
-    first = replace(STUDY, solvers=(PSO,), runs=1)
-    other = replace(first, **CHANGES[change])
-    begun, _ = grow(tmp_path, first)
-    records, stored = grow(tmp_path, other)
+    first: dict[str, Any] = {"solvers": [PSO], "runs": 1}
+    begun, _ = grow(tmp_path, **first)
+    records, stored = grow(tmp_path, **{**first, **CHANGES[change]})
     assert stored == 0 and count_files(tmp_path) == 2
     assert read_records(tmp_path) == (records, []) and records != begun
-    assert grow(tmp_path, first) == (begun, 1)
+    assert grow(tmp_path, **first) == (begun, 1)
     assert read_records(tmp_path) == (begun, [])
 
 
@@ -71,7 +69,7 @@ def find_key(run: Run) -> str:
 
 def test_a_gradient_run_depends_only_on_what_it_heeds() -> None:
     def find(solver: str, **stop: Any) -> str:
-        return find_key(Run(problem=STUDY.problems[0], solver=solver, stop=Stop(**stop)))
+        return find_key(Run(problem=WALK, solver=solver, stop=Stop(**stop)))
 
     assert find("ipopt", evaluations=300) == find("ipopt", evaluations=400, target=0.5)
     assert find("ipopt", time_limit_s=9.0) != find("ipopt")
@@ -83,30 +81,29 @@ def test_a_robot_is_its_content_wherever_its_file_lies(
 ) -> None:
     """Made heavier, it is another problem; moved, it is the same."""
 
-    def study(robot: str) -> StudySettings:
-        spec = ProblemSpec(name="nao-ssp", options={"robot": robot})
-        return replace(STUDY, problems=(spec,), solvers=(PSO,), runs=1)
+    def grow_for(robot: str) -> tuple[list[RunRecord], int]:
+        return grow(out, problems=[ProblemSpec(name="nao-ssp", options={"robot": robot})], solvers=[PSO], runs=1)
 
     out, elsewhere = tmp_path / "study", tmp_path / "elsewhere"
     elsewhere.mkdir()
     for folder in (tmp_path, elsewhere):
         (folder / "my.json").write_text(json.dumps(humanoid()))
     monkeypatch.chdir(tmp_path)
-    (first,), _ = grow(out, study("my.json"))
-    assert grow(out, study(str(elsewhere / "my.json")))[1] == 1
+    (first,), _ = grow_for("my.json")
+    assert grow_for(str(elsewhere / "my.json"))[1] == 1
     heavier = humanoid()
     heavier["links"]["torso"]["mass_kg"] *= 1.5
     (elsewhere / "my.json").write_text(json.dumps(heavier))
     monkeypatch.chdir(elsewhere)
-    (second,), stored = grow(out, study("my.json"))
+    (second,), stored = grow_for("my.json")
     assert stored == 0 and second.objective != first.objective
     monkeypatch.chdir(tmp_path)
-    assert grow(out, study("my.json"))[1] == 1
+    assert grow_for("my.json")[1] == 1
 
 
 def test_the_list_of_runs_has_each_once_in_any_order_of_commands(tmp_path: Path) -> None:
-    for settings in (STUDY, replace(STUDY, solvers=(GA,), runs=3), STUDY):
-        grow(tmp_path, settings)
+    for changes in ({}, {"solvers": [GA], "runs": 3}, {}):
+        grow(tmp_path, **changes)
     runs = read_study_file(tmp_path).runs
     assert sorted(name.rpartition("-")[0] for name in runs) == [
         f"walk12/{solver}-000{run}" for solver in ("ga", "pso") for run in (0, 1)
@@ -121,7 +118,7 @@ def test_an_algorithm_of_a_notebook_has_no_source_to_hash(monkeypatch: pytest.Mo
     monkeypatch.setitem(linecache.cache, "/tmp/ipykernel_1/1.py", (len(text), None, text.splitlines(True), ""))
     exec(compile(text, "/tmp/ipykernel_1/1.py", "exec"), notebook.__dict__)
     for solver, has_file in ((notebook.search, False), (search, True)):
-        (inputs,) = make_inputs([Run(problem=STUDY.problems[0], solver=solver)])
+        (inputs,) = make_inputs([Run(problem=WALK, solver=solver)])
         assert ("file_sha256" in inputs.solver) == has_file
 
 

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.study.run import ProblemSpec, Run, Stop
-from compare.study.settings import SolverSpec, StudySettings
+from compare.study.run import ProblemSpec, Run, Stop, plan_runs
 from compare.study.study import Study, read_records, run_study
 from tests.compare.cli.calls import nlp_gait
 from tests.compare.records import run_once
@@ -86,12 +85,12 @@ def test_many_hostile_plug_ins_leave_the_others_records_whole(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     alone = run_study(Study(runs=(Run(problem=WALK, solver="pso", stop=STOP),)))
-    solvers, ways = [SolverSpec(name="pso")], {}
+    solvers, ways = [("", "pso")], {}
     for k, way in enumerate(WAYS):
         ways[f"h{k}"] = way
-        solvers.append(SolverSpec(name=f"{written(tmp_path, f'h{k}', way)}:Algorithm", label=f"h{k}"))
-    study = StudySettings(problems=(WALK,), solvers=tuple(solvers), runs=1, stop=STOP)
-    records = run_study(Study(runs=study.make_runs(), folder=tmp_path / "out"))
+        solvers.append((f"h{k}", f"{written(tmp_path, f'h{k}', way)}:Algorithm"))
+    runs = plan_runs([WALK], solvers, runs=1, starts=1, stop=STOP)
+    records = run_study(Study(runs=runs, folder=tmp_path / "out"))
     assert capfd.readouterr().out == ""
     assert len(read_records(tmp_path / "out")[0]) == len(solvers)  # every file is read strictly
     (pso,) = [record for record in records if record.solver == "pso"]

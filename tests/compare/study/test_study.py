@@ -18,26 +18,16 @@ import numpy as np
 import pytest
 
 from compare.study.record import SCHEMA, read_record
-from compare.study.run import Handling, ProblemSpec, Run, Stop
-from compare.study.settings import SolverSpec, StudySettings, parse_settings, read_settings
+from compare.study.run import Handling, ProblemSpec, Run, Stop, plan_runs
 from compare.study.study import Study, read_records, read_study_file, run_study, write_record
 from metaheuristics import ParticleSwarm, SearchError
 from metaheuristics.interface import Array, Start
 from nlp_gait.errors import GaitError, InputError
-from tests.compare.records import run_once
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "bring_your_own.py"
 SSP = ProblemSpec(name="nao-ssp")
-SMALL = StudySettings(
-    problems=(ProblemSpec(name="walk12"),),
-    solvers=(
-        SolverSpec(name="pso", polish=True),
-        SolverSpec(name="ga"),
-        SolverSpec(name="pso", label="pso-20", settings={"population": 20}),
-    ),
-    runs=2,
-    stop=Stop(evaluations=500),
-)
+SOLVERS = [("", "pso"), ("", "ga"), ("", "ipopt"), ("pso-20", ParticleSwarm(population=20))]
+SMALL = plan_runs([ProblemSpec(name="walk12")], SOLVERS, runs=2, starts=2, stop=Stop(evaluations=500))
 
 
 def contents(folder: Path) -> dict[str, Any]:
@@ -53,36 +43,24 @@ def contents(folder: Path) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("undisturbed")
-    run_study(Study(runs=SMALL.make_runs(), folder=folder))
+    run_study(Study(runs=SMALL, folder=folder))
     return folder
 
 
 def test_each_run_has_one_file_named_after_its_inputs(undisturbed: Path) -> None:
-    names = [f"walk12/{solver}-000{run}" for solver in ("ga", "pso", "pso+ipopt", "pso-20") for run in (0, 1)]
+    names = [f"walk12/{solver}-000{run}" for solver in ("ga", "ipopt", "pso", "pso-20") for run in (0, 1)]
     runs = read_study_file(undisturbed).runs
     assert sorted(contents(undisturbed)) == sorted(f"records/{name}.json" for name in runs)
     assert sorted(name.rpartition("-")[0] for name in runs) == sorted(names)
 
 
 def test_many_workers_give_the_same_files(undisturbed: Path, tmp_path: Path) -> None:
-    run_study(Study(runs=SMALL.make_runs(), folder=tmp_path, jobs=2))
+    run_study(Study(runs=SMALL, folder=tmp_path, jobs=2))
     assert contents(tmp_path) == contents(undisturbed)
 
 
-def test_a_polished_run_carries_the_search_before_it(undisturbed: Path) -> None:
-    records = {record.solver: record for record in read_records(undisturbed)[0] if record.run == 1}
-    search, polished = records["pso"], records["pso+ipopt"]
-    assert polished.feasible and polished.objective == pytest.approx(0.970839, rel=1e-5)
-    assert polished.objective > search.objective  # maximised
-    assert polished.counts["f"] > search.counts["f"] == 500 and polished.counts["jacobian"] > 0
-    assert polished.history.evaluations[:-1] == search.history.evaluations
-    assert polished.time_s.solve > search.time_s.solve
-    assert polished.time_s.history[:-1] == search.time_s.history  # it is that run, not a repeated one
-    assert polished.active_constraints and not search.active_constraints
-
-
 def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
-    run = SMALL.make_runs()[0]
+    run = SMALL[0]
     (record,) = [r for r in read_records(undisturbed)[0] if (r.solver, r.run) == (run.title, run.number)]
     path = write_record(record, tmp_path)
     good = path.read_text()
@@ -102,7 +80,7 @@ def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
 def test_killed_at_a_random_moment_and_resumed_it_ends_as_undisturbed(undisturbed: Path, tmp_path: Path) -> None:
     program = (
         "import sys; from pathlib import Path; from tests.compare.study.test_study import SMALL, Study, run_study\n"
-        "if __name__ == '__main__': run_study(Study(runs=SMALL.make_runs(), folder=Path(sys.argv[1]), jobs=2))"
+        "if __name__ == '__main__': run_study(Study(runs=SMALL, folder=Path(sys.argv[1]), jobs=2))"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", program, str(tmp_path)], cwd=Path(__file__).parents[3], start_new_session=True
@@ -114,7 +92,7 @@ def test_killed_at_a_random_moment_and_resumed_it_ends_as_undisturbed(undisturbe
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     assert all(read_record(path) for path in tmp_path.glob("records/*/*.json"))  # whole or absent
-    run_study(Study(runs=SMALL.make_runs(), folder=tmp_path))
+    run_study(Study(runs=SMALL, folder=tmp_path))
     assert contents(tmp_path) == contents(undisturbed)
 
 
@@ -148,16 +126,6 @@ def test_a_run_that_raises_is_a_record_with_the_reason(tmp_path: Path) -> None:
     assert good.counts == {"f": 100}
     again = next(r for r in read_records(tmp_path)[0] if r.solver == "broken")
     assert again.status == broken.status and np.isnan(again.objective) and again.x == {}
-
-
-def test_polishing_a_failed_run_is_a_failure_too(tmp_path: Path) -> None:
-    (tmp_path / "own.py").write_text("def search(f, lower, upper, evaluations, seed): raise RuntimeError('no luck')\n")
-    for solver, reason in (
-        (Broken(), "RuntimeError: no <luck>"),
-        (f"{tmp_path}/own.py:search", "has no point to polish"),
-    ):
-        polished = run_once(Run(problem=SSP, solver=solver, polish=True))
-        assert reason in polished.status and not polished.x and polished.inputs.polish
 
 
 def test_a_run_that_takes_its_process_with_it_is_failed_and_the_others_are_complete(tmp_path: Path) -> None:
@@ -199,71 +167,3 @@ def test_two_solvers_of_one_name_are_refused() -> None:
     task = Run(problem=SSP, solver="pso")
     with pytest.raises(InputError, match="give them different labels"):
         Study(runs=(task, replace(task, settings={"population": 20})))
-
-
-TOML = """
-runs = 3
-starts = 2
-evaluations = 700
-seed = 5
-target = 0.9
-handling = {name = "penalty", weight = 2.0}
-
-[[problem]]
-name = "nao-ssp"
-label = "ssp-v6"
-options = {robot = "nao-v6"}
-set = {torque_change_limit_Nm = 0.3}
-fix = {swing_height_m = 0.02}
-
-[[solver]]
-name = "ipopt"
-
-[[solver]]
-name = "pso"
-label = "small-pso"
-settings = {population = 20}
-polish = true
-"""
-
-
-def test_study_file(tmp_path: Path) -> None:
-    path = tmp_path / "study.toml"
-    path.write_text(TOML)
-    settings = read_settings(path)
-    runs = settings.make_runs()
-    assert [(t.title, t.run_seed) for t in runs] == [
-        ("ipopt", 5),
-        ("ipopt", 6),
-        *(("small-pso", seed) for seed in (5, 6, 7)),
-        *(("small-pso+ipopt", seed) for seed in (5, 6, 7)),
-    ]
-    problem = runs[0].problem.load()
-    assert problem.options["robot"] == "nao-v6" and problem.value("swing_height_m.upper") == 0.02
-    assert runs[2].make_search() == ParticleSwarm(population=20) and runs[2].stop == Stop(evaluations=700, target=0.9)
-    assert parse_settings(json.loads(json.dumps(settings.to_json())), "again").make_runs() == runs
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("runs = 3", "runs = 0"), "runs must be a whole number from 1 to 100000, got 0"),
-        (("runs = 3", "runs = true"), "runs must be a whole number"),
-        (("runs = 3", "run = 3"), "unknown key 'run'; did you mean 'runs'"),
-        (("polish = true", "polished = true"), "unknown key of solver\\[1\\] 'polished'; did you mean 'polish'"),
-        (("seed = 5", "seed = 2024-01-01"), "finite numbers"),
-        (("target = 0.9", "target = nan"), "finite numbers"),
-        (("[[problem]]", "[problem]"), "at least one \\[\\[problem\\]\\]"),
-        (('name = "ipopt"', 'label = "x"'), "solver\\[0\\].name is missing"),
-        (("runs = 3", "runs = "), "is not valid TOML"),
-        (('name = "nao-ssp"', "name = 3"), "problem\\[0\\].name must be a text, got 3"),
-        (("fix = {swing_height_m = 0.02}", "fix = {swing_height_m = 2}"), "cannot be fixed"),
-        (("fix = {swing_height_m = 0.02}", "fix = 1"), "fix must be an object"),
-    ],
-)
-def test_bad_study_files_are_one_sentence(change: tuple[str, str], message: str, tmp_path: Path) -> None:
-    path = tmp_path / "study.toml"
-    path.write_text(TOML.replace(*change, 1))
-    with pytest.raises(GaitError, match=message):
-        for task in read_settings(path).make_runs():
-            task.problem.load()
