@@ -28,21 +28,15 @@ def broken_line(*corners: tuple[float, float]) -> list[FrontPoint]:
     return points(list(zip(fine.tolist(), np.interp(fine, v, w).tolist(), strict=True)))
 
 
-def test_one_corner_is_one_knee() -> None:
+def test_knees_are_corners_before_which_the_front_is_flatter() -> None:
     (knee,) = find_knees(broken_line((0.0, 1.0), (0.7, 1.1), (1.0, 4.0)))
     assert knee.value == pytest.approx(0.7)
     turn = np.degrees(np.arctan2(2.9 / 3, 0.3) - np.arctan2(0.1 / 3, 0.7))
     assert knee.turn_deg == pytest.approx(turn, abs=0.1)
-
-
-def test_two_corners_with_a_flatter_piece_between_are_two_knees() -> None:
-    knees = find_knees(broken_line((0.0, 0.0), (0.4, 0.02), (0.45, 0.4), (0.9, 0.5), (1.0, 1.0)))
-    assert [knee.value for knee in knees] == pytest.approx([0.4, 0.9])
-
-
-def test_an_arc_has_no_knee() -> None:
-    angles = np.linspace(0.0, np.pi / 2, 60)
-    assert find_knees(points([(float(np.sin(a)), float(1 - np.cos(a))) for a in angles])) == ()
+    two = find_knees(broken_line((0.0, 0.0), (0.4, 0.02), (0.45, 0.4), (0.9, 0.5), (1.0, 1.0)))
+    assert [knee.value for knee in two] == pytest.approx([0.4, 0.9])
+    arc = np.linspace(0.0, np.pi / 2, 60)
+    assert find_knees(points([(float(np.sin(a)), float(1 - np.cos(a))) for a in arc])) == ()
 
 
 @pytest.mark.usefixtures("without_compiler")

@@ -4,10 +4,11 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from compare.questions.question import Work, find
-from compare.questions.sweep import Sweep, parse_axis
+from compare.questions.sweep import Sweep, parse_axis, plot_sweep
 from compare.questions.swept_walks import SweepPoint
 from compare.report.document import Figure
 from compare.study.memo import Memo
@@ -57,6 +58,10 @@ def test_the_table_and_the_results_can_be_read_back(question: Sweep, points: lis
     assert [float(row["at.speed_m_s"]) for row in rows] == [0.04, 0.045, 1.0]
     assert rows[2]["feasible"] == "false" and float(rows[0]["indexes.step_length_m"]) > 0.0
     assert not (tmp_path / "nao-cycle-speed_m_s-1.json").exists()
+    axes = plot_sweep(points, question.problem).axes[0]
+    line, cross = axes.lines
+    assert np.isnan(line.get_ydata()).tolist() == [False, False, True] and list(cross.get_xdata()) == [1.0]
+    assert axes.get_xlabel() == "speed [m/s]" and axes.get_ylabel() == "least power [W]"
     for point in points[:2]:
         speed = point.at["speed_m_s"]
         result = load_result(tmp_path / f"nao-cycle-speed_m_s-{speed:g}.json")

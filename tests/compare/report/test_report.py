@@ -98,7 +98,7 @@ def test_summaries_by_hand() -> None:
     assert [colony[key] for key in ("median", "worst")] == [10.5, 13.0]
 
 
-def test_tables_of_solvers(tables: Tables) -> None:
+def test_tables_of_solvers_running_times_pairs_prices_and_failures(tables: Tables) -> None:
     """Columns in which nothing is known, such as guarantees here, are left out."""
     assert tables.below("solver", "runs")[:2] == [
         ["newton", "3", "2/3", "0 %", "0 %", "2/3", "52", "0.5"],
@@ -107,28 +107,20 @@ def test_tables_of_solvers(tables: Tables) -> None:
     judged_row = "newton|3|3/3|2/3|3/3|9.500000 W|10.000000 W|10.000000 W|10.000000 W"
     assert "|".join(tables.below("solver", "runs", "reported feasible")[0]) == judged_row
 
-
-def test_expected_running_times(tables: Tables) -> None:
     rows = tables.below("solver", "evaluations to 1 %")
     assert rows[0] == ["newton", "78", "78", "78", "78", "0.75", "0.75", "0.75", "0.75"]
     assert rows[1] == ["swarm", "850", "-", "-", "-", "8.5", "-", "-", "-"]
     assert rows[2] == ["colony", "1600", "1700", "-", "-", "16", "17", "-", "-"]
 
-
-def test_pairs(tables: Tables) -> None:
-    rows = {row[0]: row[1:] for row in tables.below("better median < other")[:3]}
+    pairs = {row[0]: row[1:] for row in tables.below("better median < other")[:3]}
     # Costs: newton 10, 10, inf; swarm 10.05, 10.1, 11, 12; colony 10.005, 10.5, inf, 13.
     # The first is better in 8 of 12 pairs; in 8 of 12 with one tie; in 10 of 16.
-    assert rows["newton < swarm"][-1] == f"{8 / 12:.3f}"
-    assert rows["newton < colony"][-1] == f"{8.5 / 12:.3f}"
-    assert rows["swarm < colony"][-1] == f"{(3 + 3 + 2 + 2) / 16:.3f}"
+    assert pairs["newton < swarm"][-1] == f"{8 / 12:.3f}"
+    assert pairs["newton < colony"][-1] == f"{8.5 / 12:.3f}"
+    assert pairs["swarm < colony"][-1] == f"{(3 + 3 + 2 + 2) / 16:.3f}"
 
-
-def test_prices_are_those_of_the_best_optimum(tables: Tables) -> None:
     assert tables.row("knee <b>torque</b>")[1:] == ["upper", "2.5 Nm", "-0.125 W per Nm", "-0.0125 W for 0.1 Nm"]
 
-
-def test_every_failed_run_stands_there_with_its_reason(tables: Tables) -> None:
     rows = tables.below("solver", "run", "seed")[:2]
     assert rows[0] == ["newton", "2", "2", "restoration failed", "balance by 0.1 m"]
     assert rows[1][:4] == ["colony", "2", "2", "<script>alert(1)</script> | failed"]
@@ -156,13 +148,10 @@ def test_statistics_over_problems_appear_from_five_problems_on() -> None:
         assert ("All problems" in [section.title for section in document.sections]) == (count == 5)
 
 
-def test_command_and_machine_are_shown(tables: Tables) -> None:
+def test_the_page_shows_command_and_machine_and_loads_nothing(page: str, tables: Tables) -> None:
+    assert tables.loads == []
     assert tables.row("command") == ["command", "nlp-gait compare <b>walk</b>"]
     assert tables.row("processor") == ["processor", "abacus"]
-
-
-def test_page_loads_nothing(page: str, tables: Tables) -> None:
-    assert tables.loads == []
     assert "@import" not in page and "url(http" not in page
     ids = re.findall(r'\bid="([^"]+)"', page)
     assert len(ids) == len(set(ids))

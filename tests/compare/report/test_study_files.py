@@ -52,8 +52,10 @@ def test_the_numbers_are_those_of_the_runs(records: list[RunRecord]) -> None:
 
 
 def test_csv_has_the_gap_dimension_budget_and_costs_to_targets(records: list[RunRecord], tmp_path: Path) -> None:
-    comparisons = compare_problems(records)
-    FurtherFiles(csv=True).write(tmp_path, comparisons, EMPTY)
+    comparisons, nothing = compare_problems(records), FurtherFiles()
+    assert nothing.write(tmp_path, comparisons, EMPTY) == []
+    (tmp_path / "runs.csv").write_text("old\n")
+    assert tmp_path / "runs.csv" in nothing.write(tmp_path, comparisons, EMPTY)  # it is kept up to date
     with open(tmp_path / "runs.csv") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(records) and {(row["n"], row["budget"]) for row in rows} == {("4", "1000")}
@@ -62,14 +64,6 @@ def test_csv_has_the_gap_dimension_budget_and_costs_to_targets(records: list[Run
         assert float(row["gap"]) == pytest.approx(gap, abs=1e-12)
         assert (row["evaluations_to_0.01"] != "") == (gap <= 0.01) == (row["seconds_to_0.01"] != "")
         assert row["evaluations_to_0.01"] == "" or 0 < float(row["evaluations_to_0.01"]) <= 1000
-
-
-def test_runs_csv_is_written_again_where_it_exists(records: list[RunRecord], tmp_path: Path) -> None:
-    nothing = FurtherFiles()
-    assert nothing.write(tmp_path, compare_problems(records), EMPTY) == []
-    (tmp_path / "runs.csv").write_text("old\n")
-    assert tmp_path / "runs.csv" in nothing.write(tmp_path, compare_problems(records), EMPTY)
-    assert (tmp_path / "runs.csv").read_text().startswith("problem,solver,run,")
 
 
 def test_all_figures_are_written_for_papers_with_embedded_fonts(records: list[RunRecord], tmp_path: Path) -> None:
