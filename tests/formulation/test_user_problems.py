@@ -114,18 +114,13 @@ def test_messages_say_what_is_wrong_with_the_file(text: str, message: str, tmp_p
         ({"upper": "1"}, "'knee': upper must be a CasADi MX, got str '1'"),
         ({"value": None}, "'knee': value must be a CasADi MX, got NoneType"),
         ({"value": THREE}, "'knee': value has 3 rows and labels has 0; give one label per row"),
-        ({"value": THREE, "labels": ("a", "b")}, "'knee': value has 3 rows and labels has 2"),
         ({"value": THREE.T}, "'knee': value must be a column, got shape \\(1, 3\\)"),
-        ({"lower": THREE}, "'knee': lower must have one row or as many as value, 1, got 3"),
         ({"scale": 0.0}, "'knee': scale must be > 0"),
-        ({"scale": "big"}, "'knee': scale must be a finite number, got 'big'"),
         ({"lower": None}, "'knee': lower, upper or both are required"),
-        ({"lower": 2.0, "upper": 1.0}, "'knee': lower must not be above upper, got 2 and 1"),
         (
             {"value": THREE, "labels": ("a", "b", "c"), "lower": 0.5, "upper": MX([1.0, 0.0, 1.0])},
             "'knee': lower must not be above upper, got 0.5 and 0",
         ),
-        ({"over": "foo"}, "'knee': over must be one of None, 'instant', .*, got 'foo'"),
     ],
 )
 def test_a_row_is_refused_by_name(change: dict[str, Any], message: str) -> None:
@@ -191,8 +186,6 @@ def vars_of(problem: GaitProblem) -> dict[str, Any]:
         (lambda x, y, p, ops: (x, (row(x, lower=y),)), "constraint 'knee': lower must depend on parameters only"),
         (lambda x, y, p, ops: (x, (row(x), row(y))), "duplicated rows: knee"),
         (lambda x, y, p, ops: (x + MX.sym("mass"), ()), "objective contains 'mass', which is neither a variable nor"),
-        (lambda x, y, p, ops: (x, (row(MX.sym("q") * x),)), "constraint 'knee' contains 'q'"),
-        (lambda x, y, p, ops: (ca.vertcat(x, y), ()), "must be a scalar"),
         (
             lambda x, y, p, ops: (x, (two_rows(ca.vertcat(x, y), lower=MX([0.0, float("nan")])),)),
             "constraint 'knee': lower is NaN; give a number, or leave it out for no bound",
@@ -201,7 +194,6 @@ def vars_of(problem: GaitProblem) -> dict[str, Any]:
             lambda x, y, p, ops: (x, (two_rows(ca.vertcat(x, y), ("left", "a$")),)),
             "printable text without '\\$', got 'a\\$'",
         ),
-        (lambda x, y, p, ops: (x, (two_rows(ca.vertcat(x, y), ("left", "a\n")),)), "printable text without"),
     ],
 )
 def test_mathematics_that_backends_cannot_use_is_refused(mathematics: Any, message: str) -> None:

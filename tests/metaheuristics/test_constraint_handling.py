@@ -90,15 +90,3 @@ def test_a_violation_equal_to_epsilon_counts_as_none() -> None:
     assert (major.tolist(), minor.tolist()) == ([0.0, 0.0], [5.0, 6.0])
     strict = EpsilonLevel().rule(1.0, np.array([2.0]))
     assert strict.order(np.array([0.0, 1.0, 0.5]), np.array([0.5, 0.0, 0.75])).tolist() == [1, 0, 2]
-
-
-def test_epsilon_falls_to_zero_at_the_control_fraction() -> None:
-    handling = EpsilonLevel(share=0.5, exponent=2.0, control=0.8)
-    initial = np.array([4.0, 1.0, np.inf, 3.0, 2.0])  # finite ones sorted: 1, 2, 3, 4; a share of a half gives 3
-    assert handling.epsilon(0.0, initial) == 3.0
-    assert handling.epsilon(0.4, initial) == 3.0 * 0.5**2
-    assert handling.epsilon(0.8, initial) == handling.epsilon(1.0, initial) == 0.0
-    assert handling.epsilon(0.0, np.array([np.inf])) == 0.0
-    f, v = np.array([0.0, 1.0, 2.0]), np.array([2.9, 0.0, 3.1])
-    assert handling.rule(0.0, initial).order(f, v).tolist() == [0, 1, 2]
-    assert handling.rule(0.9, initial).order(f, v).tolist() == [1, 0, 2]

@@ -81,12 +81,8 @@ def test_a_program_may_leave_a_process_behind_that_holds_its_output() -> None:
             "sleep 30", "sent nothing for 0.5 s: it has not sent its first line.*in Octave", marks=pytest.mark.slow
         ),  # it is waited for
         ("echo hello", "neither"),
-        ("echo '[1, 2]'", "neither"),
         ("""printf '{"x": [[0.1,'""", "neither"),
-        ("""printf '{"x": "abc"}\\n'""", "must be points of 2 numbers"),
         ("""printf '{"x": [[1, 2, 3]]}\\n'""", r"\(P, 2\)"),
-        ("""printf '{"x": []}\\n'""", r"\(P, 2\)"),
-        ("""printf '{"x": [[NaN, 1]]}\\n'""", "outside the bounds"),
         ("""printf '{"x": [[0, 1e999]]}\\n'""", "outside the bounds"),
         ("""printf '{"x": [[0, 2.1]]}\\n'""", "outside the bounds"),
         ("head -c 3000000 /dev/zero", "neither"),

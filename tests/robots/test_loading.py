@@ -62,29 +62,16 @@ def set_in(*path: str, to: object) -> Callable[[dict[str, Any]], None]:
 
 DAMAGES = [
     (set_in("links", "left", "mass_kg", to=-1.0), r"link 'left': mass_kg must be > 0, got -1\.0"),
-    (set_in("links", "left", "mass_kg", to="1"), r"robot\.json': links\.left\.mass_kg must be a number, got '1'"),
-    (set_in("links", "left", "mass_kg", to=True), r"links\.left\.mass_kg must be a number, got True"),
     (set_in("links", "left", "mass_kg", to=float("nan")), r"'links\.left\.mass_kg' must be finite, got nan"),
-    (
-        set_in("links", "left", "com_m", to=[0.0, 0.0]),
-        r"links\.left\.com_m must be a list of 3 values, got \[0\.0, 0\.0\]",
-    ),
     (
         set_in("links", "left", "inertia_com_kgm2", to=[3e-3, 1e-3, 1e-3, 0, 0, 0]),
         r"link 'left': .* principal moments 1\.000e-03, 1\.000e-03, 3\.000e-03 .* shifted to the centre of mass twice\?",
     ),
-    (set_in("links", "left", "inertia_com_kgm2", to=[-1e-3, 1e-3, 1e-3, 0, 0, 0]), "needs all >= 0"),
-    (set_in("links", to=[1, 2]), r"robot\.json': links must be an object, got \[1, 2\]"),
     (set_in("joints", "LHip", "limits_rad", to=[1.0, -1.0]), r"joint 'LHip': limits_rad must be ordered .* \[1\.0, -1"),
-    (set_in("joints", "LHip", "planning_limits_rad", to=[1.0, 1.0]), "planning_limits_rad must be ordered"),
     (set_in("joints", "LHip", "axis", to=[0.0, 2.0, 0.0]), r"axis must be a unit vector, got \(0\.0, 2\.0, 0\.0\)"),
     (set_in("joints", "LHip", "velocity_limit_rad_s", to=0), r"velocity_limit_rad_s must be > 0, got 0\.0"),
-    (set_in("joints", "LHip", "torque_limit_Nm", to=-2), r"torque_limit_Nm must be > 0, got -2\.0"),
     (set_in("joints", "LHip", "parent", to="tail"), r"joint 'LHip': link 'tail' does not exist"),
-    (set_in("joints", "LHip", "parent", to=None), r"robot\.json': joints\.LHip\.parent must be a text, got None"),
     (set_in("joints", "LHip", "child", to="right"), r"link 'right' already has a parent or is the root"),
-    (set_in("joints", "LHip", "child", to="torso"), r"link 'torso' already has a parent or is the root"),
-    (set_in("joints", "LHip", "motor", to="Maxon"), r"joints\.LHip\.motor must be an object, got 'Maxon'"),
     (
         set_in(
             "joints",
@@ -103,15 +90,10 @@ DAMAGES = [
     (set_in("links", "tail", to=link()), r"robot 'tiny': no joint carries link tail"),
     (with_joint_ring, r"robot 'tiny': joints above link 'a' form a ring"),
     (set_in("root", to="pelvis"), r"robot 'tiny': root 'pelvis' is not a link"),
-    (set_in("root", to=3), r"robot\.json': root must be a text or null, got 3"),
     (set_in("name", to=None), r"robot\.json': 'name' is missing"),
     (set_in("feet", to={"left": foot("left")}), r"robot 'tiny': foot 'right' is missing or names no link"),
     (set_in("feet", "left", "link", to="paw"), r"foot 'left' is missing or names no link"),
-    (set_in("feet", "left", "front_m", to=0), r"foot 'left': front_m must be > 0, got 0\.0"),
-    (set_in("feet", "left", "sole_polygon_m", to="round"), r"feet\.left\.sole_polygon_m must be a list, got 'round'"),
     (set_in("schema", to=2), r"schema must be 1, got 2"),
-    (set_in("extends", to=7), r"extends must be a text or null, got 7"),
-    (set_in("sources", to=["somewhere"]), r"sources must be an object, got \['somewhere'\]"),
 ]
 
 
@@ -124,27 +106,6 @@ def test_what_is_wrong_with_a_robot_is_reported(
     damage(raw)
     with pytest.raises(RobotDataError, match=message):
         load_robot(written(tmp_path, raw))
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (b"{", "is not valid JSON"),
-        (b"[]", r"it must be an object, got \[\]"),
-        (b"[" * 100_000, "is not valid JSON"),
-        (b"{}", "'name' is missing"),
-        (b"\xff\xfe\x00", "cannot be read"),
-        (None, "cannot be read: .*No such file"),
-    ],
-    ids=["cut off", "list", "too deep", "empty", "binary", "missing"],
-)
-def test_a_damaged_file_is_named(tmp_path: Path, content: bytes | None, message: str) -> None:
-    path = tmp_path / "robot.json"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(RobotDataError, match=message) as error:
-        load_robot(str(path))
-    assert str(path) in str(error.value)
 
 
 @pytest.mark.parametrize("ring", ["a", "ab"])

@@ -9,7 +9,7 @@ import pytest
 from nlp_gait.errors import InputError, RobotDataError, UnknownNameError
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.leg import make_leg
-from nlp_gait.robots.perturbation import list_quantities, name_perturbed, perturb, split_name
+from nlp_gait.robots.perturbation import name_perturbed, perturb, split_name
 from tests.robots.crooked import crooked
 
 NAO = load_robot("nao-v5")
@@ -22,13 +22,6 @@ def test_masses_and_inertias_scale() -> None:
     own, other = (robot.links["LThigh"].inertia_com_kgm2 for robot in (NAO, heavy))
     assert other == pytest.approx([2.2 * value for value in own])
     assert heavy.links["LThigh"].com_m == NAO.links["LThigh"].com_m
-
-
-def test_both_legs_get_longer() -> None:
-    tall = perturb(NAO, {"thigh_m": 0.001, "tibia_m": -0.002})
-    for side in "LR":
-        assert tall.joints[f"{side}KneePitch"].origin_m == pytest.approx((0.0, 0.0, -0.101))
-        assert tall.joints[f"{side}AnklePitch"].origin_m == pytest.approx((0.0, 0.0, -0.1009))
 
 
 def test_the_legs_of_any_robot_get_longer(tmp_path: Path) -> None:
@@ -70,12 +63,6 @@ def test_a_name_carries_the_changes() -> None:
     assert robot.mass_kg == pytest.approx(1.05 * NAO.mass_kg)
     assert split_name("nao-v5") == ("nao-v5", {})
     assert split_name("my@robots/nao.json") == ("my@robots/nao.json", {})
-
-
-def test_every_quantity_can_be_changed() -> None:
-    for name in list_quantities(NAO):
-        value = 1.01 if name.endswith("mass") else 1e-3
-        assert perturb(NAO, {name: value}) is not NAO
 
 
 @pytest.mark.parametrize(

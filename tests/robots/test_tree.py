@@ -53,15 +53,6 @@ def test_every_link_seen_from_every_link_is_where_pinocchio_puts_it(link: str, s
         np.testing.assert_allclose(centre, expected, rtol=0, atol=TOLERANCE)
 
 
-def test_a_tree_holds_every_link_once_and_parents_come_first() -> None:
-    for link in ROBOT.links:
-        tree = make_tree(ROBOT, link)
-        assert sorted(body.link.name for body in tree) == sorted(ROBOT.links)
-        assert tree[0].link.name == link
-        assert all(body.parent < i for i, body in enumerate(tree))
-        assert sum(body.link.mass_kg for body in tree) == pytest.approx(ROBOT.mass_kg)
-
-
 def test_a_welded_head_is_pinocchios_sum_of_inertias() -> None:
     torso = weld(ROBOT, HEAD).links["torso"]
     total, offset = inertia(ROBOT.links["torso"]), np.zeros(3)

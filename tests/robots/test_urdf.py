@@ -141,13 +141,10 @@ DAMAGES = [
         change("link[@name='LThigh']/inertial/inertia", "izz", None),
         r"link 'LThigh': <inertia> needs the attribute 'izz'",
     ),
-    (change("link[@name='LThigh']/inertial/mass"), r"link 'LThigh': <inertial> must have one <mass>, got 0"),
-    (change(f"{KNEE}/origin", "rpy", "0 0 x"), r"joint 'LKneePitch': rpy of <origin> must be 3 finite numbers"),
     (
         change(f"{KNEE}/origin", "xyz", "nan 0 0"),
         r"joint 'LKneePitch': xyz of <origin> must be 3 finite .* 'nan 0 0'",
     ),
-    (change(f"{KNEE}/parent", "link", "l_ankle"), r"joint 'LKneePitch' is part of a ring of joints"),
     (change(f"{KNEE}/child", "link", "torso"), r"exactly one link must have no parent, got LTibia|ring|none"),
     (change(KNEE, "name", "RKneePitch"), r"joint 'RKneePitch' appears twice"),
     (change("link[@name='LTibia']", "name", "RTibia"), r"link 'RTibia' appears twice"),
@@ -163,21 +160,6 @@ def test_what_is_wrong_with_a_urdf_is_reported(
     damage(tree)
     with pytest.raises(RobotDataError, match=message):
         load_robot(stored(tmp_path, tree))
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "is not valid XML"),
-        ("<robot name='a'><link name='b'>", "is not valid XML"),
-        ("<model/>", "is not a URDF of a robot"),
-        ("<robot name='a'/>", "exactly one link must have no parent, got none"),
-    ],
-    ids=["empty", "cut off", "another format", "no link"],
-)
-def test_what_is_not_a_urdf_is_reported(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(RobotDataError, match=message):
-        load_robot(stored(tmp_path, text))
 
 
 LAUGHS = "".join(f'<!ENTITY l{k} "{f"&l{k - 1};" * 10}">' for k in range(1, 12))

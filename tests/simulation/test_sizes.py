@@ -6,8 +6,6 @@ from nlp_gait import load
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.registry import LARGEST_COUNT
-from nlp_gait.simulation.balance.controller import Balance
-from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import LONGEST_S as LONGEST_PLAYED_S
 from nlp_gait.simulation.plan import MOST_STEPS, make_plan
 
@@ -29,10 +27,3 @@ def test_the_length_of_a_simulated_walk_is_limited() -> None:
     ):
         with pytest.raises(InputError, match=words):
             make_plan(result, steps)
-
-
-@pytest.mark.parametrize("owner", [Drive, Balance])
-@pytest.mark.parametrize("period_s", [1e-12, 1e6])
-def test_no_controller_commands_every_picosecond_or_once_a_month(owner: type, period_s: float) -> None:
-    with pytest.raises(InputError, match=f"must be from 0.0001 to 1, got {period_s!r}"):
-        owner(period_s=period_s)

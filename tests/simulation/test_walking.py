@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, Signals, sample_finely
 from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.gaits.several_steps import measure_step, repeat_steps
@@ -105,9 +104,3 @@ def test_feet_stand_when_they_are_planned_to(cycle: Result) -> None:
     assert plan.supports == ()
     assert plan.stands("left", times).tolist() == [1, 1, 1, 0, 1]
     assert plan.stands("right", times).tolist() == [0, 1, 1, 1, 1]
-
-
-@pytest.mark.parametrize("steps", [0, -1, True, 1.0])
-def test_a_wrong_number_of_steps_is_refused(signals: Signals, steps: int) -> None:
-    with pytest.raises(InputError, match="steps must be a whole number >= 1"):
-        repeat_steps(signals, make_nao("nao-v5").robot, steps)

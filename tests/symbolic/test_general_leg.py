@@ -66,21 +66,6 @@ def pose(leg: Leg, k: int) -> tuple[Array, float, float]:
     return column[:3] - rotation @ leg.hip_m, roll, pitch
 
 
-def test_any_point_of_the_torso_may_be_given(robots: dict[str, Robot]) -> None:
-    """Here, at rest, one that is 0.3 m above the origin and beside it; the leg is the same."""
-    leg, by_origin = leg_function(robots["nao"], "left")
-    above = (0.02, -0.01, 0.3)
-    by_point = leg_function(robots["nao"], "left", above)[1]
-    origin, roll, pitch = pose(leg, 0)
-    turn = Rotation.from_euler("xy", [roll, pitch]).as_matrix()
-    rest = [np.zeros(3)] * 2
-    angles = [
-        function(place, *rest, roll, 0.0, 0.0, pitch, 0.0, 0.0)[0].full()
-        for function, place in ((by_origin, origin), (by_point, origin + turn @ above))
-    ]
-    assert angles[1] == pytest.approx(angles[0], abs=1e-9)
-
-
 @pytest.mark.parametrize("name", ["nao", "crooked"])
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_the_foot_is_flat_and_at_the_requested_place(robots: dict[str, Robot], name: str, side: str) -> None:

@@ -69,15 +69,6 @@ def test_forward_kinematics_after_inverse_kinematics_is_the_identity(
         assert q[2] == pytest.approx(knee, abs=1e-12)  # the knee bends forward
 
 
-def test_a_stretched_and_a_right_angled_leg_by_hand() -> None:
-    q, _, _, reach = angles(EXACT, np.array([0.0, 0.0, -(THIGH + TIBIA)]), STILL, STILL)
-    assert reach == pytest.approx(1.0, abs=1e-12)
-    assert q == pytest.approx(np.zeros(5), abs=1e-6)  # the square root of the rounding of the cosine
-    q, _, _, reach = angles(EXACT, np.array([-TIBIA, 0.0, -THIGH]), STILL, STILL)  # thigh down, tibia back
-    assert reach == pytest.approx(0.0, abs=1e-12)
-    assert q == pytest.approx([0.0, 0.0, np.pi / 2, -np.pi / 2, 0.0], abs=1e-12)
-
-
 @pytest.mark.parametrize("function", [EXACT, LIFTED], ids=["exact", "lifted"])
 @pytest.mark.parametrize("seed", range(5))
 def test_velocities_and_accelerations_by_central_differences(function: ca.Function, seed: int) -> None:

@@ -12,7 +12,6 @@ from nlp_gait.gaits.stairs.planar_biped import (
     locate_points,
     make_dynamics,
 )
-from nlp_gait.symbolic.dynamics import equations_of_motion
 
 pinocchio = pytest.importorskip("pinocchio")
 
@@ -94,15 +93,6 @@ def planar_model() -> tuple[object, np.ndarray]:
         if parent:
             matrix[row, LINKS.index(parent)] -= signs[parent]
     return model, matrix
-
-
-def test_pendulum() -> None:
-    q, qd = SX.sym("q"), SX.sym("qd")
-    motion = equations_of_motion(0.5 * 2.0 * 0.3**2 * qd**2, -2.0 * 9.81 * 0.3 * ca.cos(q), q, qd)
-    M, C, G = ca.Function("pendulum", [q, qd], list(motion))(0.5, 2.0)
-    assert float(M) == pytest.approx(0.18)
-    assert float(C) == 0.0
-    assert float(G) == pytest.approx(2.0 * 9.81 * 0.3 * np.sin(0.5))
 
 
 def test_upright_points() -> None:

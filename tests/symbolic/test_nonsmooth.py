@@ -130,13 +130,6 @@ def test_a_rollout_by_hand_and_its_equations() -> None:
     assert off == [0.0, 0.0, 1.0, 0.0, -1.0, 0.0]
 
 
-def test_lifts_of_minima_and_absolute_values_leave_freedom_on_one_side() -> None:
-    ops = Lifted(MX(1e-3))
-    ops.abs(MX(1.0))
-    ops.min(MX(1.0), MX(2.0))
-    assert [(lift.from_above, lift.tight) for lift in ops.lifts] == [(True, False), (False, False)]
-
-
 def test_a_root_is_newtons_result_or_a_variable_that_an_equation_ties() -> None:
     """x^2 = 2, from 1.5: 1.4142135623730951 after four steps."""
 
