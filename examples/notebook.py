@@ -2,7 +2,7 @@
 In a notebook
 =============
 
-Results are displayed: the last value of a cell is a table, time histories and runs become data frames, gaits become figures.
+Time histories and runs become data frames, gaits become figures.
 This page can be downloaded as a notebook.
 """
 # sphinx_gallery_thumbnail_path = "images/nao-ssp-convergence.png"
@@ -13,10 +13,10 @@ from compare.study.run import ProblemSpec, Run, Stop
 from compare.study.study import Study, run_study
 
 # %%
-# A solution is a table of its variables, with the prices of its active bounds.
+# A solution has its variables by name, and the prices of its active bounds.
 
 solution = nlp_gait.solve("nao-dsp", starts=2)
-solution
+solution.x
 
 # %%
 # Time histories by name: arrays, or a pandas data frame whose index is time.

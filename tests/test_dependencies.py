@@ -20,7 +20,6 @@ LAYERS = (
     "nlp_gait.processes",
     "nlp_gait.files",
     "nlp_gait.columns",
-    "nlp_gait.notebook",
     "nlp_gait.decoding",
     "nlp_gait.progress",
     "nlp_gait.option_groups",

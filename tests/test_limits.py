@@ -164,7 +164,8 @@ def test_values_and_options_are_kept_and_problems_can_be_pickled() -> None:
 def test_limits_of_one_kind_of_phase_are_loaded_again_as_such() -> None:
     cycle = nlp_gait.load("nao-cycle", intervals=2)
     limited = cycle.with_limits(single_support=[FrictionCone(), FootClearance()], double_support=[FootClearance()])
-    assert limited.options["limits"] == "single_support:FrictionCone,FootClearance"
+    names = "single_support:FrictionCone,single_support:FootClearance,double_support:FootClearance"
+    assert limited.options["limits"] == names
     rows = build_exact_model(limited).row_names
     assert not any(row.startswith("dsp_friction[") for row in rows)
     assert build_exact_model(nlp_gait.load("nao-cycle", **limited.options)).row_names == rows

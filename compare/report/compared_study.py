@@ -22,7 +22,6 @@ from compare.study.run import IPOPT, ProblemSpec, Stop, plan_runs
 from compare.study.study import Study, StudyFile, run_study
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.notebook import format_html_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class ComparedStudy:
-    """A finished study; notebooks display its headlines and tables."""
+    """A finished study; its text is its headlines."""
 
     records: Sequence[RunRecord]
 
@@ -46,12 +45,6 @@ class ComparedStudy:
 
     def __repr__(self) -> str:
         return "\n".join(write_headlines(self.comparisons))
-
-    def _repr_html_(self) -> str:
-        return "".join(
-            format_html_table(title, *format_rows(comparison))
-            for title, comparison in zip(write_headlines(self.comparisons), self.comparisons, strict=False)
-        )
 
     def table(self, problem: str | None = None) -> str:
         """Return the table of solvers on a problem, by default on the first one, as text."""

@@ -1,7 +1,5 @@
 """What a gait problem is, how to make or change one, and a gait of one that was found."""
 
-from typing import TYPE_CHECKING, Any
-
 from nlp_gait.formulation.assembly import (
     Assembly,
     Constraint,
@@ -18,15 +16,9 @@ from nlp_gait.formulation.assembly import (
 )
 from nlp_gait.formulation.display import Display, SimulationModel
 from nlp_gait.formulation.gait_problem import GaitProblem, SolverHints, Start
+from nlp_gait.formulation.registry import list_problems, load, maker
+from nlp_gait.formulation.result import Result, load_result, sample_at_period, sample_finely, sample_signals
 from nlp_gait.formulation.signals import Array, Columns, Signals, make_vector_columns
-from nlp_gait.providers import import_object
-
-if TYPE_CHECKING:
-    from nlp_gait.formulation.registry import list_problems, load, maker
-    from nlp_gait.formulation.result import Result, load_result, sample_at_period, sample_finely, sample_signals
-
-# Imported on first use, others from ``result``: what is part of a problem needs neither the registry nor results.
-_REGISTRY = ("list_problems", "load", "maker")
 
 __all__ = [
     "Array",
@@ -59,10 +51,3 @@ __all__ = [
     "sample_finely",
     "sample_signals",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a name when it is first used."""
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return import_object(f"{__name__}.{'registry' if name in _REGISTRY else 'result'}:{name}")

@@ -10,40 +10,29 @@ from nlp_gait.providers import LIMITS, import_object
 SINGLE, DOUBLE = "single_support:", "double_support:"  # in front of a name: the limit is of these phases only
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class AddedLimits:
-    """Limits (see ``nlp_gait.limits.Limit``) by kind of phase, and their names, which are recorded as an option."""
+    """Limits with their names, which are recorded as an option."""
 
-    single_support: tuple[Any, ...] = ()
-    double_support: tuple[Any, ...] = ()
-    names: tuple[str, ...] = ()
+    #: Prefix (empty for a limit of every phase), name, and limit, see ``nlp_gait.limits.Limit``
+    entries: tuple[tuple[str, str, Any], ...] = ()
 
     def __str__(self) -> str:
-        return ",".join(self.names)
+        return ",".join(prefix + name for prefix, name, _ in self.entries)
 
     def select(self, standing: Iterable[str]) -> tuple[Any, ...]:
         """Return the limits of a phase from the sides of the feet that stand."""
-        return self.single_support if len(tuple(standing)) == 1 else self.double_support
-
-    def extend(self, added: "AddedLimits") -> "AddedLimits":
-        """Return these limits and more."""
-        return AddedLimits(
-            single_support=self.single_support + added.single_support,
-            double_support=self.double_support + added.double_support,
-            names=self.names + added.names,
-        )
+        kind = SINGLE if len(tuple(standing)) == 1 else DOUBLE
+        return tuple(limit for prefix, _, limit in self.entries if prefix in ("", kind))
 
 
-def make_added_limits(single_support: Iterable[Any], double_support: Iterable[Any]) -> AddedLimits:
-    """Return limits that are given as objects; raises InputError for a class in place of an object."""
-    single, double = tuple(single_support), tuple(double_support)
-    for limit in (*single, *double):
-        if isinstance(limit, type) or not callable(getattr(limit, "add", None)):
-            raise InputError(f"a limit must be an object with a method add, got {limit!r}; for example FrictionCone()")
-    of_single, of_double = ([type(limit).__name__ for limit in limits] for limits in (single, double))
-    names = [name if name in of_double else f"{SINGLE}{name}" for name in of_single]
-    names += [f"{DOUBLE}{name}" for name in of_double if name not in of_single]
-    return AddedLimits(single_support=single, double_support=double, names=tuple(dict.fromkeys(names)))
+def add_limits(present: str | AddedLimits, single_support: Iterable[Any], double_support: Iterable[Any]) -> AddedLimits:
+    """Return present limits and more, which are given as objects; raises InputError for a class in place of an object."""
+    kinds = ((SINGLE, single_support), (DOUBLE, double_support))
+    added = [(prefix, type(limit).__name__, limit) for prefix, limits in kinds for limit in limits]
+    for _, name, limit in added:
+        _check_limit(limit, name)
+    return AddedLimits((*parse_limits(present).entries, *added))
 
 
 def parse_limits(value: str | AddedLimits) -> AddedLimits:
@@ -55,20 +44,14 @@ def parse_limits(value: str | AddedLimits) -> AddedLimits:
     """
     if isinstance(value, AddedLimits):
         return value
-    names = split_names(value)
-    limits = [(phase, _load_limit(name)) for phase, name in names]
-    return AddedLimits(
-        single_support=tuple(limit for phase, limit in limits if phase != DOUBLE),
-        double_support=tuple(limit for phase, limit in limits if phase != SINGLE),
-        names=tuple(phase + name for phase, name in names),
-    )
+    return AddedLimits(tuple((prefix, name, _load_limit(name)) for prefix, name in split_names(value)))
 
 
 def resolve_limits(text: str, owner: str) -> str:
     """Return names of limits in a data file (the owner) as the user gave them; raises as ``resolve_code``."""
     import nlp_gait.user_code as user_code
 
-    return ",".join(phase + user_code.resolve_code(name, "limit", owner) for phase, name in split_names(text))
+    return ",".join(prefix + user_code.resolve_code(name, "limit", owner) for prefix, name in split_names(text))
 
 
 def hash_limits(text: str) -> str:
@@ -99,6 +82,10 @@ def _load_limit(name: str) -> Any:
     loaded: Any = user_code.load_object(name, "limit")
     path = user_code.parse_reference(name, "limit").home
     limit = user_code.call_user_code(name, path, loaded) if isinstance(loaded, type) else loaded
-    if not callable(getattr(limit, "add", None)):
-        raise InputError(f"{name!r} must be a class of limits with a method add, got {loaded!r}")
+    _check_limit(limit, name)
     return limit
+
+
+def _check_limit(limit: Any, name: str) -> None:
+    if isinstance(limit, type) or not callable(getattr(limit, "add", None)):
+        raise InputError(f"limit {name!r} must be an object with a method add, such as FrictionCone(), got {limit!r}")

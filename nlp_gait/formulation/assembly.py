@@ -1,9 +1,11 @@
 """Parts of a problem's mathematics: variables, parameters, symbols of both, constraints, and rows as functions of time."""
 
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, Literal, TypeAlias, TypeVar, get_args
+from numbers import Real
+from typing import Any, Generic, Literal, TypeAlias, TypeGuard, TypeVar, get_args
 
 import casadi as ca
 import numpy as np
@@ -16,6 +18,37 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 Expression = TypeVar("Expression", MX, SX, DM)
 # What rows refer to: an instant, changes over intervals, a mean over time, a root mean square, or no time.
 Over: TypeAlias = Literal["instant", "interval", "mean", "root-mean-square", "once"]
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Return whether a value is a finite real number, NumPy's included; True and False are not."""
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # an integer larger than every float
+        return False
+
+
+def to_floats(what: str, values: object) -> Array:
+    """Return array-like values of any shape as doubles, copied only if necessary; they need not be finite.
+
+    Raises InputError for complex or masked numbers, texts, dates, true or false, which NumPy would convert silently.
+    """
+    # Importing numpy.ma here would cost every process a tenth of its start.
+    if "numpy.ma" in sys.modules and np.ma.is_masked(values):
+        raise InputError(f"{what} must be numbers, got a masked array; fill or remove masked values")
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind == "O" and all(isinstance(v, Real) and not isinstance(v, bool) for v in array.flat):
+            return array.astype(np.float64)
+        if array.dtype.kind in "iuf" and not isinstance(values, np.ndarray):  # true among numbers would become 1
+            if any(isinstance(v, (bool, np.bool_)) for v in np.asarray(values, dtype=object).flat):
+                raise InputError(f"{what} must be numbers, got true or false among them")
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{what} must be numbers, got {type(values).__name__}: {error}") from error
+    if array.dtype.kind not in "iuf":
+        got = f"{type(values).__name__} of {array.dtype}"
+        raise InputError(f"{what} must be numbers, got {got}: use real numbers, not texts, true or false")
+    return array.astype(np.float64, copy=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -83,11 +83,6 @@ class Skeleton:
     planar: bool = False  # only the side view is meaningful
     title: str = ""  # one line
 
-    def support(self, k: int) -> Array | None:
-        """Return the support polygon (M, 2) at a sample, the hull of the loaded soles from above [m]; None without one."""
-        loaded = [sole.corners[k, :, :2] for sole in self.soles if sole.supports[k]]
-        return find_hull(np.concatenate(loaded)) if loaded else None
-
     def margin(self) -> Array:
         """Return the distance (T,) of the zero-moment point from the nearest edge of the support polygon [m], negative outside.
 

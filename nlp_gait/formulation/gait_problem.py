@@ -19,11 +19,19 @@ from casadi import DM, MX
 
 from nlp_gait.errors import InputError, UnknownNameError, check_choice, format_value, unknown
 from nlp_gait.formulation import assembly as parts
-from nlp_gait.formulation.added_limits import make_added_limits, parse_limits
-from nlp_gait.formulation.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Variable
+from nlp_gait.formulation.added_limits import add_limits
+from nlp_gait.formulation.assembly import (
+    Assembly,
+    NumericPoint,
+    Objective,
+    Parameter,
+    Point,
+    Variable,
+    is_number,
+    to_floats,
+)
 from nlp_gait.formulation.display import Display
 from nlp_gait.formulation.locking import Cache, lock_casadi
-from nlp_gait.formulation.numbers import is_number, to_floats
 from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -39,7 +47,6 @@ Start = Callable[[Mapping[str, float], np.random.Generator], Array]
 # A point is on a bound if it misses it by at most this share of the variable's default range.
 ROUNDING = 1e-6
 LONGEST_LINE = 98  # of a problem that is printed, without its brackets
-MOST_ROWS = 40  # of a printed table
 LIMITS_OPTION = "limits"  # of makers whose problems have phases
 
 
@@ -109,20 +116,6 @@ class GaitProblem:
         goal, n = self.objective, len(self.variables)
         text = f"{self.address}: {goal.sense} {goal.name} [{goal.unit}] over {n} variables, {len(self.own_parameters)} parameters"
         return f"<{text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 3] + '...'}>"
-
-    def describe(self) -> str:
-        """Return tables of the variables, parameters and options, as text; ``print(problem.describe())``."""
-        variables = [(v.name, f"{low:g}", f"{high:g}", v.unit, v.description) for v, low, high in
-                     zip(self.variables, self.lower.tolist(), self.upper.tolist(), strict=True)]  # fmt: skip
-        parameters = [(q.name, f"{self.value(q.name):g}", q.unit, q.description) for q in self.own_parameters]
-        blocks = [f"{self.address}: {self.title}", repr(self)[1:-1].partition(": ")[2]]
-        for header, rows in (
-            (("variable", "lower", "upper", "unit", ""), variables),
-            (("parameter", "value", "unit", ""), parameters),
-            (("option", "value"), [(name, str(value)) for name, value in self.options.items()]),
-        ):
-            blocks += [_format_table(header, rows)] if rows else []
-        return "\n\n".join(blocks)
 
     @property
     def moves(self) -> bool:
@@ -214,8 +207,7 @@ class GaitProblem:
         make, options = self._origin or (None, {})
         if make is None or LIMITS_OPTION not in options:
             raise InputError(f"problem {self.name!r} takes no limits; those of NAO and of humanoids do")
-        added = make_added_limits(single_support, double_support)
-        limits = parse_limits(options[LIMITS_OPTION]).extend(added)
+        limits = add_limits(options[LIMITS_OPTION], single_support, double_support)
         return make(**{**options, LIMITS_OPTION: limits}).with_values(**self.values)
 
     def fix(self, /, **values: float) -> GaitProblem:
@@ -437,15 +429,6 @@ def _make_again(make: Callable[..., GaitProblem], options: tuple[tuple[str, Any]
     if repr(problem.display.robot) != robot:
         raise InputError(f"problem {problem.name!r}: the file of its robot has changed since the problem was pickled")
     return problem
-
-
-def _format_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return aligned columns of the first rows."""
-    lines = [header, *rows[:MOST_ROWS]]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(header))]
-    text = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
-    more = [f"and {len(rows) - MOST_ROWS:,} more"] if len(rows) > MOST_ROWS else []
-    return "\n".join([*text, *more])
 
 
 def draw_uniform(names: Sequence[str], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:

@@ -10,10 +10,9 @@ import numpy as np
 from casadi import MX, SX
 
 from nlp_gait.errors import InputError, format_value, unknown
-from nlp_gait.formulation.assembly import Assembly, Constraint, Objective, Parameter, Point, Variable
+from nlp_gait.formulation.assembly import Assembly, Constraint, Objective, Parameter, Point, Variable, to_floats
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
-from nlp_gait.formulation.numbers import to_floats
 from nlp_gait.formulation.signals import Array
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 

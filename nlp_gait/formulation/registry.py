@@ -15,10 +15,9 @@ from casadi import MX, Function, vertcat
 from nlp_gait.errors import InputError, check_name, describe_type, format_value, unknown
 from nlp_gait.files import check_path
 from nlp_gait.formulation.added_limits import AddedLimits, hash_limits, resolve_limits
-from nlp_gait.formulation.assembly import Assembly, Parameter, Variable
+from nlp_gait.formulation.assembly import Assembly, Parameter, Variable, is_number
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
-from nlp_gait.formulation.numbers import is_number
 from nlp_gait.formulation.plain_problem import name_problem
 from nlp_gait.option_groups import find_groups, list_options, pack_options, replace_signature
 from nlp_gait.providers import PROBLEMS, import_object

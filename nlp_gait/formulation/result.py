@@ -1,8 +1,7 @@
 """Results: a point of a problem, read from the file of `solve --out` or a few lines by hand; its signals."""
 
 import math
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -60,25 +59,19 @@ def load_result(path: Path) -> Result:
     Raises InputError for a file that cannot be read or is damaged, and for values that the problem does not allow.
     """
     raw = read_json(path, "result")
-    with explain_errors(f"result {str(path)!r}", "`nlp-gait solve ... --out FILE` writes a valid one"):
+    owner = f"result {str(path)!r}"
+    try:
         file = decode(_ResultFile, raw, ignore_unknown=True)
         name, options = resolve_stored(file.problem, file.options, "it")
         problem = load(name, **options).with_values(**file.parameters)
         result = Result(problem=problem, x=problem.check_x(file.x))
         if file.robot not in (None, result.problem.options.get("robot")):
             raise InputError(f"'robot' is {file.robot!r}, but the option of that name decides: write it into 'options'")
-        return result
-
-
-@contextmanager
-def explain_errors(owner: str, remedy: str) -> Iterator[None]:
-    """Convert errors in a file's content to InputError, with the owner and, where it is not valid, what to do."""
-    try:
-        yield
     except ValueError as error:
-        raise InputError(f"{owner}: {error}; {remedy}") from error
+        raise InputError(f"{owner}: {error}; `nlp-gait solve ... --out FILE` writes a valid one") from error
     except GaitError as error:
         raise InputError(f"{owner}: {error}") from error
+    return result
 
 
 def sample_signals(result: Result, period_s: float) -> Signals:
@@ -103,14 +96,6 @@ def sample_signals(result: Result, period_s: float) -> Signals:
     return signals if dense is None else dense.signals(result.x)
 
 
-def count_periods(signals: Signals, period_ms: int) -> int:
-    """Count whole periods of a motion, at least one; if it ends at rest, its last pose is held for the rest of one more."""
-    arrays = signals.arrays
-    count = 1000.0 * float(arrays["t"][-1]) / period_ms
-    rests = "qd" in arrays and bool(np.abs(arrays["qd"][-1]).max() < AT_REST)
-    return max(1, math.ceil(count - ROUNDING) if rests else math.floor(count + ROUNDING))
-
-
 def sample_finely(result: Result) -> Signals:
     """Return signals with ``FINE_INTERVALS`` intervals a step if the problem can be refined; raises as ``sample_signals``."""
     signals = sample_signals(result, math.inf)
@@ -119,7 +104,7 @@ def sample_finely(result: Result) -> Signals:
 
 
 def sample_at_period(result: Result, period_ms: int) -> Signals:
-    """Return signals exactly a period apart, see ``count_periods``.
+    """Return signals exactly a period apart, of all whole periods; of a motion that ends at rest, of the begun one, too.
 
     Values are interpolated linearly between fine samples, so that torques do not overshoot where a foot lands. Raises as
     ``sample_signals``, and InputError for a period that is not a whole number of milliseconds >= 1.
@@ -127,7 +112,10 @@ def sample_at_period(result: Result, period_ms: int) -> Signals:
     check_count("period_ms", period_ms)
     end = float(sample_signals(result, math.inf).arrays["t"][-1])
     fine = sample_signals(result, min(period_ms / 1000.0, end / FINE_INTERVALS))
-    t = np.arange(count_periods(fine, period_ms) + 1) * period_ms / 1000.0
+    count = 1000.0 * float(fine.arrays["t"][-1]) / period_ms
+    rests = "qd" in fine.arrays and bool(np.abs(fine.arrays["qd"][-1]).max() < AT_REST)
+    periods = max(1, math.ceil(count - ROUNDING) if rests else math.floor(count + ROUNDING))
+    t = np.arange(periods + 1) * period_ms / 1000.0
     arrays = {"t": t}
     for name, values in fine.arrays.items():
         if name != "t":

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import InputError, unknown
-from nlp_gait.notebook import format_html_table, import_pandas
+from nlp_gait.errors import InputError, MissingExtraError, unknown
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -69,26 +68,15 @@ class Signals:
 
     def to_frame(self) -> Any:
         """Return ``named_columns`` as a pandas data frame indexed by time; ``frame.attrs["units"]`` has the units by column."""
-        columns = {name: (unit, values) for name, unit, values in self.named_columns()}
-        unit, t = columns.pop("t")
-        module = import_pandas()
-        index = module.Index(t, name=f"t [{unit}]")
-        frame = module.DataFrame({name: values for name, (_, values) in columns.items()}, index=index)
-        frame.attrs["units"] = {name: unit for name, (unit, _) in columns.items()}
+        pandas, (_, *columns) = import_pandas(), self.named_columns()
+        index = pandas.Index(self.arrays["t"], name="t [s]")
+        frame = pandas.DataFrame({name: values for name, _, values in columns}, index=index)
+        frame.attrs["units"] = {name: unit for name, unit, _ in columns}
         return frame
 
     def __repr__(self) -> str:
         t = self.arrays["t"]
         return f"<Signals over {t[-1] - t[0]:.4g} s in {len(t)} samples: {', '.join(self.arrays)}>"
-
-    def _repr_html_(self) -> str:
-        t = self.arrays["t"]
-        rows = [
-            (name, unit, str(len(labels)), " ".join(labels), f"{table.min():.4g} to {table.max():.4g}")
-            for name, unit, labels, table in self._tables()
-        ]
-        note = f"{len(t)} samples over {t[-1] - t[0]:.4g} s; signals[{rows[0][0]!r}] is an array, signals.to_frame() a data frame"
-        return format_html_table("Time histories", ("name", "unit", "columns", "of", "range"), rows, note)
 
     def _tables(self) -> Iterator[tuple[str, str, tuple[str, ...], Array]]:
         for name, array in self.arrays.items():
@@ -100,3 +88,12 @@ class Signals:
             if described is None:
                 raise InputError(f"time history {name!r} has no unit: describe its columns")
             yield name, described.unit, described.labels, array[:, None] if array.ndim == 1 else array
+
+
+def import_pandas() -> Any:
+    """Return the module pandas, which only data frames need; raises MissingExtraError if it is not installed."""
+    try:
+        import pandas
+    except ImportError as error:
+        raise MissingExtraError(f"a data frame needs pandas ({error}); install it with pip install pandas") from error
+    return pandas

@@ -8,14 +8,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nlp_gait.formulation.signals import Array, Signals
-from nlp_gait.notebook import format_html_table
 
 if TYPE_CHECKING:
     from nlp_gait.formulation.gait_problem import GaitProblem
 
 # A total violation below this counts as feasible (each row in units of its scale).
 FEASIBILITY_TOLERANCE = 1e-6
-SHOWN = 20  # variables, and constraints with a price, in a notebook
 # Fields of an outcome in the file of a result.
 WRITTEN = ("claimed", "feasible", "status", "objective", "violation", "iterations", "time_s")
 
@@ -184,15 +182,6 @@ class Solution:
         value = f"{goal.name} {self.objective:.6g} {goal.unit}" if self.feasible else "infeasible"
         counts = f"{sum(start.converged for start in self.starts)} of {len(self.starts)} starts"
         return f"<Solution of {self.problem.address}: {value}; {counts} of {self.best.solver} converged>"
-
-    def _repr_html_(self) -> str:
-        bounds = {a.name: f"{a.price:.4g} {a.price_unit}" for a in self.active_constraints}
-        x = [(name, f"{value:.6g}", bounds.pop(f"bounds[{name}]", "")) for name, value in list(self.x.items())[:SHOWN]]
-        rows = [(name, "", price) for name, price in list(bounds.items())[:SHOWN]]
-        left_out = max(len(self.x) - SHOWN, 0) + max(len(bounds) - SHOWN, 0)
-        note = self.status + (f"; {left_out} more in .x and .active_constraints" if left_out else "")
-        header = ("variable or constraint", "value", "price of raising its bound")
-        return format_html_table(repr(self)[1:-1], header, [*x, *rows], note)
 
     def signals(self) -> Signals:
         """Return time histories at x; raises InputError if the problem has none."""

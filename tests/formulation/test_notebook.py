@@ -1,6 +1,5 @@
 """Display of results: one line in a terminal, a small table in a notebook, data frames, and the balance margin."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,19 +42,9 @@ def test_time_histories_by_name_and_as_a_data_frame(signals: Signals) -> None:
     assert list(frame.columns) == ["tau hip", "tau <knee>", "share"] and frame.attrs["units"]["tau hip"] == "Nm"
     assert frame["tau hip"][0.5] == 2.0
     assert repr(signals) == "<Signals over 1 s in 3 samples: tau, share, t>"
-    assert "&lt;knee&gt;" in signals._repr_html_() and "<knee>" not in signals._repr_html_()
 
 
-def test_a_solution_with_many_prices_displays_twenty(solution: nlp_gait.Solution) -> None:
-    prices = tuple(replace(solution.active_constraints[0], name=f"row_{i}") for i in range(30))
-    shown = replace(solution, active_constraints=prices)._repr_html_()
-    assert "row_19<" in shown and "row_20<" not in shown
-    assert "; 10 more in .x and .active_constraints" in shown and " more in " not in solution._repr_html_()
-
-
-def test_a_solution_displays_a_table_its_signals_and_its_gait(solution: nlp_gait.Solution) -> None:
-    shown = solution._repr_html_()
-    assert "hip_height_m" in shown and "W per m" in shown and len(shown) < 5000
+def test_a_solution_has_its_signals_and_its_gait(solution: nlp_gait.Solution) -> None:
     problem = nlp_gait.load("nao-dsp")
     np.testing.assert_array_equal(solution.signals()["tau"], problem.signals(solution.x)["tau"])
     figure = solution.plot()

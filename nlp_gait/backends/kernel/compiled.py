@@ -29,8 +29,8 @@ from nlp_gait.backends.kernel.compiler import (
 from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import CompilerError, InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.assembly import to_floats
 from nlp_gait.formulation.locking import lock_casadi
-from nlp_gait.formulation.numbers import to_floats
 
 _INTEGER, _POINTER = ctypes.c_longlong, ctypes.c_void_p
 # Of the inputs of an objective, which all candidates share: parameters, lower and upper bounds, weights.

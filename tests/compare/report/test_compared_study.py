@@ -21,7 +21,7 @@ def test_one_call_compares_searches_with_ipopt(study: ComparedStudy, tmp_path: P
     assert [len(comparison.solvers) for comparison in study.comparisons] == [3, 3]
     assert str(study).startswith("nao-dsp: The median ") and "above the proven optimum of 0.531886 W" in str(study)
     assert study.table("nao-ssp").splitlines()[1].split()[:2] == ["IPOPT", "1"]
-    assert study.plot().axes and "small swarm" in study._repr_html_()
+    assert study.plot().axes
     frame = study.to_frame()
     assert len(frame) == 14 and set(frame.solver) == {"ipopt", "pso", "small swarm"}
     assert "<html" in study.report(tmp_path).read_text()
