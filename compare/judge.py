@@ -14,7 +14,6 @@ from nlp_gait.files import read_json
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 from nlp_gait.proofs.guarantee import Guarantee, guarantee
-from nlp_gait.proofs.time_search import MEAN_SHARPNESS
 
 SLIGHT = 1e-3  # violation, as a share of a row's scale, and error of an objective that printed digits explain
 SHOWN = 3  # violated rows
@@ -58,11 +57,10 @@ def evaluate(
     x: Sequence[float] | Array | Mapping[str, float],
     *,
     prove: bool = True,
-    mean_sharpness: float = MEAN_SHARPNESS,
 ) -> Evaluation:
     """Return the exact values at x (n,), in the problem's order or by name; raises InputError for a wrong length or NaN.
 
-    Without ``prove`` nothing is proven of a feasible point: ``guaranteed`` is None; see ``guarantee`` for the sharpness.
+    Without ``prove`` nothing is proven of a feasible point: ``guaranteed`` is None.
     """
     point = problem.check_x(x)
     exact = build_exact_model(problem)
@@ -87,9 +85,7 @@ def evaluate(
         if dense is None or dense_values is None
         else build_exact_model(dense).find_violated(dense_values),
         dense_intervals=None if dense is None else factor * parts,
-        guaranteed=guarantee(problem, point, mean_sharpness)
-        if prove and values.violation <= FEASIBILITY_TOLERANCE
-        else None,
+        guaranteed=guarantee(problem, point) if prove and values.violation <= FEASIBILITY_TOLERANCE else None,
     )
 
 

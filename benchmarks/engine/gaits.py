@@ -10,8 +10,7 @@ import numpy as np
 
 import nlp_gait
 from compare.questions.question import find
-from compare.questions.sweep import Axis, Sweep
-from compare.questions.swept_walks import SweepPoint
+from compare.questions.sweep import Axis, Sweep, SweepPoint
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import ClassVar, cast
 
@@ -14,7 +14,6 @@ from matplotlib.figure import Figure as Drawing
 from compare.analysis.units import format_quantity, list_units, make_axis_label, with_unit
 from compare.drawing.figures import COLOURS, make_axes, use_style
 from compare.questions.question import Answer, Question, Work, make_record_table
-from compare.questions.swept_walks import COST, SweepPoint, mark_values, report_walks
 from compare.report.document import Figure, make_text_table
 from compare.study.references import find_reference
 from compare.study.run import IPOPT, describe_problem
@@ -53,6 +52,21 @@ def parse_axis(text: str) -> Axis:
     if not name or not numbers or not np.all(np.isfinite(numbers)):
         raise InputError(f"--over takes NAME=LOW:HIGH:COUNT or NAME=V1,V2,..., got {text!r}")
     return Axis(name=name, values=tuple(numbers))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepPoint:
+    """Result at one point of the grid."""
+
+    at: Mapping[str, float]  #: value of each axis
+    objective: float  #: exact value, in the problem's sense
+    feasible: bool  #: a feasible optimum was found
+    status: str  #: in words; without a feasible point it names the violated constraints
+    x: Mapping[str, float]  #: by variable name
+    violation: float  #: exact total violation
+    evaluations: int  #: calls of f
+    time_s: float  #: wall time [s]
+    indexes: Mapping[str, float] = field(default_factory=dict)  #: exact performance indexes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -147,7 +161,6 @@ class Sweep(Question[list[SweepPoint]]):
             parts=(
                 make_text_table((*axes, objective.name, "status", "best known"), rows, "Optima"),
                 Figure(name=stem, caption=shown, drawing=plot_sweep(findings, problem)),
-                *report_walks(problem, findings),
                 make_record_table(stem, findings),
             ),
             data={"problem": problem.name, "points": [asdict(point) for point in findings]},
@@ -157,7 +170,7 @@ class Sweep(Question[list[SweepPoint]]):
                     "x": dict(point.x),
                 }
                 for point in findings
-                if point.feasible and COST in point.indexes
+                if point.feasible and "cost_of_transport" in point.indexes  # for `simulate`
             },
         )
 
@@ -199,7 +212,9 @@ def plot_sweep(points: Sequence[SweepPoint], problem: GaitProblem) -> Drawing:
             values = [point.objective if point.feasible else np.nan for point in line]
             colour = shade if other_axes else COLOURS[IPOPT]
             axes.plot([point.at[first] for point in line], values, "o-", color=colour, label=label or IPOPT)
-        mark_values(axes, sorted({point.at[first] for point in points if not point.feasible}), "infeasible")
+        if missing := sorted({point.at[first] for point in points if not point.feasible}):
+            low = [0.03] * len(missing)
+            axes.plot(missing, low, "x", color="0.4", label="infeasible", transform=axes.get_xaxis_transform())
         axes.set_xlabel(make_axis_label(first, units[first]))
         axes.set_ylabel("least " * (objective.sign > 0) + make_axis_label(objective.name, objective.unit))
         figure.legend(loc="outside right upper") if other_axes else axes.legend()

@@ -62,7 +62,7 @@ class Guarantee:
         return "?" if self.satisfied is None else "yes" if self.satisfied else "no"
 
 
-def guarantee(problem: GaitProblem, x: Array, mean_sharpness: float = time_search.MEAN_SHARPNESS) -> Guarantee:
+def guarantee(problem: GaitProblem, x: Array) -> Guarantee:
     """Prove which rows a point x (n,) satisfies at all times; bounds of means have a relative distance.
 
     Rows that do not depend on time, such as those of a switch, are left to the judge.
@@ -73,7 +73,7 @@ def guarantee(problem: GaitProblem, x: Array, mean_sharpness: float = time_searc
         phases = [problem.build_once(time_search.make_time_functions, rows) for rows in problem.rows_over_time]
     except CompilerError as error:
         return Guarantee(satisfied=None, reason=str(error))
-    results = [_search_phase(problem, phase, np.asarray(x, dtype=float), mean_sharpness) for phase in phases]
+    results = [_search_phase(problem, phase, np.asarray(x, dtype=float)) for phase in phases]
     means: dict[str, tuple[float, float]] = {}
     for _, phase_means, _ in results:
         for name, (low, high) in phase_means.items():
@@ -88,7 +88,7 @@ def guarantee(problem: GaitProblem, x: Array, mean_sharpness: float = time_searc
 
 
 def _search_phase(
-    problem: GaitProblem, phase: time_search.TimeFunctions, x: Array, mean_sharpness: float
+    problem: GaitProblem, phase: time_search.TimeFunctions, x: Array
 ) -> tuple[list[RowViolation], dict[str, tuple[float, float]], int]:
     """Return violations, bounds of means by name, and the number of pieces."""
     start, end = phase.source.times({**problem.by_name(x), **problem.parameter_values})
@@ -105,7 +105,7 @@ def _search_phase(
         search.run(time_search.make_pieces(phase.source.kinks, shift))
         limits = np.stack([lower[plain:], upper[plain:]], axis=-1)
         limits[[k - plain for k in phase.squares if shift is None]] **= 2
-        search.sharpen_integrals(limits, mean_sharpness)
+        search.sharpen_integrals(limits)
         pieces += search.count
         for k, (a, b) in sorted(search.first.items()):
             piece = start + a * (end - start), start + b * (end - start)

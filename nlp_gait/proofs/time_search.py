@@ -27,8 +27,8 @@ COARSE = 2.0**-10
 MOST_PIECES = 1000
 # Relative distance of the bounds of a violation at which they are sharp enough.
 SHARPNESS = 0.02
-# The same for bounds of a mean, bounds that only decide whether its limit is satisfied, and the largest number of pieces for it.
-MEAN_SHARPNESS, DECISIVE = 4e-3, 1e9
+# The same for bounds of a mean, and the largest number of pieces for it.
+MEAN_SHARPNESS = 4e-3
 MOST_MEAN_PIECES = 800
 # Widens sums over pieces: far more than their rounding errors.
 ROUNDING = 1e-12
@@ -218,7 +218,7 @@ class TimeSearch:
         low, high = self._settled[1].sum(axis=0).T
         return low - ROUNDING * (1 + np.abs(low)), high + ROUNDING * (1 + np.abs(high))
 
-    def sharpen_integrals(self, limits: Array, sharpness: float) -> None:
+    def sharpen_integrals(self, limits: Array) -> None:
         """Halve the pieces that add most to the width of the integrals' bounds, until these are narrow.
 
         Bounds on both sides of a limit (k, 2) are narrowed as far as the number of pieces allows, whatever the sharpness.
@@ -229,7 +229,7 @@ class TimeSearch:
             low, high = integrals.sum(axis=0).T
             astride = ((low[:, None] < limits) & (limits < high[:, None])).any(axis=1)
             bounded = np.isfinite(low) & np.isfinite(high) & ~astride
-            wanted = np.where(bounded, sharpness * np.maximum(np.abs(low), np.abs(high)), 0.0)
+            wanted = np.where(bounded, MEAN_SHARPNESS * np.maximum(np.abs(low), np.abs(high)), 0.0)
             again: Flags = (spread > wanted / len(pieces)).any(axis=1) & (spread.sum(axis=0) > wanted).any()
             if not again.any() or len(pieces) + again.sum() > MOST_MEAN_PIECES:
                 break

@@ -15,7 +15,7 @@ from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Over, Point,
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import affine
 from nlp_gait.proofs.guarantee import guarantee
-from nlp_gait.proofs.time_search import DECISIVE, bound_violation
+from nlp_gait.proofs.time_search import bound_violation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
 from tests.proofs.soundness import feasible_gaits, find_contradictions
@@ -113,14 +113,6 @@ def test_a_mean_is_that_over_time() -> None:
     (violation,) = found.violations
     assert found.satisfied is False and (violation.from_s, violation.to_s) == (1.0, 3.0)
     assert 0.0 < violation.least <= 1e-3 <= violation.most
-
-
-@pytest.mark.parametrize("share", [0.9, 0.999, 1.001, 1.1])  # of the mean that is allowed
-def test_bounds_of_a_mean_that_only_decide_give_the_same_word_in_fewer_pieces(share: float) -> None:
-    problem, x = waving(share * 2 / math.pi * PEAK, "mean"), np.array([PEAK, 0.0])
-    sharp, decisive = guarantee(problem, x), guarantee(problem, x, mean_sharpness=DECISIVE)
-    assert decisive.word == sharp.word == ("no" if share < 1.0 else "yes")
-    assert decisive.pieces <= sharp.pieces
 
 
 def test_rows_that_say_nothing_of_time_are_named_as_sampled() -> None:

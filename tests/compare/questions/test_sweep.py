@@ -1,12 +1,18 @@
 """Sweeps: axes, true curves, tables and pictures."""
 
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 from compare.questions.question import Work, find
-from compare.questions.sweep import MOST_POINTS, Axis, Sweep, parse_axis
+from compare.questions.sweep import MOST_POINTS, Axis, Sweep, parse_axis, plot_sweep
 from compare.report.document import Table
 from nlp_gait import load
 from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.formulation import load_result
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
@@ -68,6 +74,31 @@ def test_errors_come_before_the_work() -> None:
         Sweep(problem=problem, axes=[Axis(name="swing_height_m", values=(0.02, 0.2))])
     with pytest.raises(InputError, match="once"):
         Sweep(problem=problem, axes=[Axis(name="swing_height_m", values=(0.02,))] * 2)
+
+
+def test_gaits_of_a_walking_cycle_are_drawn_and_can_be_simulated(tmp_path: Path) -> None:
+    """Few samples, and a third point without a gait."""
+    problem = load("nao-cycle", objective="power", intervals=2)
+    question = Sweep(problem=problem, axes=[parse_axis("speed_m_s=0.04,0.045")], starts=1)
+    points = find(question)
+    for point in points:
+        assert point.feasible and point.indexes["speed_m_s"] == pytest.approx(point.at["speed_m_s"])
+        cost = point.objective / (5.30535 * 9.8 * point.at["speed_m_s"])
+        assert point.indexes["cost_of_transport"] == pytest.approx(cost)
+    lost = replace(points[1], at={"speed_m_s": 1.0}, feasible=False, status="in the way: step_length")
+    question.report([*points, lost]).write(tmp_path)
+    rows = list(csv.DictReader((tmp_path / "nao-cycle-sweep-speed_m_s-ipopt.csv").read_text().splitlines()))
+    assert [float(row["at.speed_m_s"]) for row in rows] == [0.04, 0.045, 1.0]
+    assert rows[2]["feasible"] == "false" and float(rows[0]["indexes.step_length_m"]) > 0.0
+    assert not (tmp_path / "nao-cycle-speed_m_s-1.json").exists()
+    for point in points:
+        speed = point.at["speed_m_s"]
+        result = load_result(tmp_path / f"nao-cycle-speed_m_s-{speed:g}.json")
+        assert result.problem.value("speed_m_s") == speed and result.problem.by_name(result.x) == point.x
+    axes = plot_sweep([*points, lost], problem).axes[0]
+    line, cross = axes.lines
+    assert np.isnan(line.get_ydata()).tolist() == [False, False, True] and list(cross.get_xdata()) == [1.0]
+    assert axes.get_xlabel() == "speed [m/s]" and axes.get_ylabel() == "least power [W]"
 
 
 def test_a_sweep_is_as_large_as_its_grid() -> None:
