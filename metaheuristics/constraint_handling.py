@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from metaheuristics.errors import check_number
 from metaheuristics.interface import FEASIBILITY, Array, Rule
-from metaheuristics.settings import check_number
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

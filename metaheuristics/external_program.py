@@ -14,10 +14,9 @@ from typing import IO, Any
 
 import numpy as np
 
-from metaheuristics.errors import SearchError, abbreviate
+from metaheuristics.errors import SearchError, abbreviate, check_number
 from metaheuristics.interface import Array, CallingSearch, Ended, Evaluate, Start, to_real_array
 from metaheuristics.preparation import check_points
-from metaheuristics.settings import check_number
 from metaheuristics.user_algorithm import combine
 
 LONGEST_LINE = 2**26  # bytes

@@ -16,7 +16,7 @@ from threadpoolctl import ThreadpoolController
 
 from metaheuristics import interface, preparation
 from metaheuristics.constraint_handling import Deb
-from metaheuristics.errors import SearchError, abbreviate
+from metaheuristics.errors import SearchError, abbreviate, is_number
 from metaheuristics.interface import (
     Algorithm,
     Array,
@@ -27,7 +27,6 @@ from metaheuristics.interface import (
     Rule,
     Search,
 )
-from metaheuristics.settings import is_number
 
 # Packages whose searches and objectives use NumPy's BLAS and LAPACK alone.
 WITHOUT_SCIPY = ("metaheuristics.algorithms", "nlp_gait", "compare")
@@ -330,9 +329,8 @@ def _search(search: Search | CallingSearch, run: _Run, start: interface.Start) -
         if not run.record.generations:
             raise SearchError(f"f was never called: {reasons[0]}")
         return reasons
-    preparation.check_search(search, run.algorithm)
     while True:
         X = preparation.check_points(search.ask(), start.lower, start.upper)
         search.tell(X, *run(X))
-        if reasons := preparation.check_reasons(search.stop()):
-            return reasons
+        if ends := search.stop():
+            return list(ends)

@@ -6,14 +6,14 @@ snapshots = minimize_many(objectives, make_front_algorithm("NSGA2"), evaluations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from metaheuristics.adapters.pymoo import FRONT_MODULES, MultiObjective
+from metaheuristics.adapters.pymoo import PymooSettings
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Array, Bounded
-from metaheuristics.preparation import prepare_start
+from metaheuristics.preparation import fill_fixed, prepare_start
 from metaheuristics.registry import make_by_name
 
 
@@ -28,8 +28,26 @@ class ManyObjectives(Bounded, Protocol):
         """Objectives (P, m), finite and all of comparable size, and total violations (P,) of points (P, n)."""
 
 
+@dataclass(frozen=True, kw_only=True, slots=True)
+class MultiObjective(PymooSettings):
+    """An algorithm of pymoo for several objectives, ``"NSGA2"`` or ``"CMOPSO"``; a population of 100 is pymoo's own choice.
+
+    Source:
+        Deb et al. (2002), NSGA-II; Zhang et al. (2018), A competitive mechanism based multi-objective particle swarm
+        optimizer with fast convergence.
+    """
+
+    population: int = 100
+    modules: ClassVar[Mapping[str, str]] = {"NSGA2": "moo.nsga2", "CMOPSO": "moo.cmopso"}
+
+    @property
+    def name(self) -> str:
+        """The algorithm's."""
+        return self.algorithm
+
+
 FRONT_ALGORITHMS: Mapping[str, Callable[..., MultiObjective]] = {
-    name: partial(MultiObjective, algorithm=name) for name in FRONT_MODULES
+    name: partial(MultiObjective, algorithm=name) for name in MultiObjective.modules
 }
 """Algorithms by name; `pip install 'nlp-gait[algorithms]'` installs pymoo, which they need."""
 
@@ -82,20 +100,38 @@ def minimize_many(
     start = prepare_start(objectives, algorithm.population, evaluations[-1], seed)
     if not (start.upper > start.lower).any():
         raise SearchError("all variables are fixed, so there is no front; widen the bounds of one")
-    search = algorithm.start(start, objectives.count)
+    search = algorithm.begin(start, objectives.count)
+    if algorithm.algorithm == "CMOPSO":
+        _seed_elites(search)
 
     snapshots: list[Snapshot] = []
     used = 0
     while True:
-        X = search.ask()
+        individuals = search.ask()
+        X = fill_fixed(individuals.get("X"), start.lower, start.upper)
         while used + len(X) > evaluations[len(snapshots)]:
-            points, values = search.front()
-            snapshots.append(Snapshot(evaluations=used, X=points, F=values))
+            best = search.opt[search.opt.get("FEAS")[:, 0]]
+            sizes = {"X": search.problem.n_var, "F": search.problem.n_obj}
+            points, values = (best.get(name).astype(float).reshape(len(best), size) for name, size in sizes.items())
+            snapshots.append(Snapshot(evaluations=used, X=fill_fixed(points, start.lower, start.upper), F=values))
             if len(snapshots) == len(evaluations):
                 return tuple(snapshots)
         F, violation = objectives(X)
         if not np.all(np.isfinite(F)):
             raise SearchError("an objective is not finite; give a large finite number where it has no value")
         # A violation that is not finite counts as the worst.
-        search.tell(X, F, np.nan_to_num(violation, nan=1e30, posinf=1e30))
+        individuals.set("F", np.array(F), "G", np.nan_to_num(violation, nan=1e30, posinf=1e30)[:, None])
+        for individual in individuals:
+            individual.H, individual.evaluated = np.zeros(0), {"F", "G", "H"}
+        search.tell(infills=individuals)
         used += len(X)
+
+
+def _seed_elites(search: Any) -> None:
+    """Seed the generator with which pymoo thins out CMOPSO's elites, so that equal seeds give equal runs."""
+    tournament = search.elites.truncation.survival
+
+    def truncate(members: Any, count: int) -> Any:
+        return tournament.do(search.problem, members, n_survive=count, random_state=search.random_state)
+
+    search.elites.truncation = truncate

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metaheuristics.errors import SearchError, abbreviate
+from metaheuristics.errors import SearchError, abbreviate, is_number
 from metaheuristics.interface import Algorithm, Array, Bounded, Start, to_real_array
-from metaheuristics.settings import is_number
 
 LARGEST = 1e100  # of a bound; algorithms multiply distances
 
@@ -43,12 +42,9 @@ def read_bounds(objective: Bounded) -> tuple[Array, Array]:
         raise SearchError(f"objective must be a function of X with names, lower and upper, got {abbreviate(objective)}")
     try:
         names = tuple(objective.names)
-    except TypeError:
-        raise SearchError(f"names must be one for each variable, got {abbreviate(objective.names)}") from None
-    try:
         lower, upper = np.array(to_real_array(objective.lower)), np.array(to_real_array(objective.upper))
     except (TypeError, ValueError) as error:
-        raise SearchError(f"bounds must be numbers: {error}") from error
+        raise SearchError(f"names must be one for each variable, and bounds must be numbers: {error}") from error
     if not names or lower.shape != (len(names),) or upper.shape != (len(names),):
         raise SearchError(
             f"bounds must have shape (n,) with one name per variable and n >= 1; got {len(names)} names, "
@@ -114,22 +110,6 @@ def check_population(algorithm: Algorithm, name: str = "") -> None:
         raise SearchError(
             f"algorithm {name or name_of(algorithm)!r}: population must be a whole number >= 1, got {abbreviate(population)}"
         )
-
-
-def check_search(search: object, algorithm: Algorithm) -> None:
-    """Raise SearchError unless a search has `ask`, `tell` and `stop`."""
-    missing = [name for name in ("ask", "tell", "stop") if not callable(getattr(search, name, None))]
-    if missing:
-        raise SearchError(
-            f"algorithm {name_of(algorithm)!r}: start must return a search with {', '.join(missing)}, got {abbreviate(search)}"
-        )
-
-
-def check_reasons(reasons: object) -> list[str]:
-    """Return the reasons of a search to stop; raises SearchError unless these are texts."""
-    if not isinstance(reasons, (list, tuple)) or not all(isinstance(reason, str) for reason in reasons):
-        raise SearchError(f"stop must return a list of reasons as texts, empty to continue, got {abbreviate(reasons)}")
-    return list(reasons)
 
 
 def check_helpers(handling: object, callback: object) -> None:

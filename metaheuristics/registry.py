@@ -14,9 +14,8 @@ from metaheuristics.algorithms.genetic import GeneticAlgorithm, GoswamiGeneticAl
 from metaheuristics.algorithms.particle_swarm import ConstantInertiaSwarm, ParticleSwarm
 from metaheuristics.algorithms.random_search import RandomSearch
 from metaheuristics.constraint_handling import Deb, EpsilonLevel, StaticPenalty
-from metaheuristics.errors import SearchError, abbreviate
+from metaheuristics.errors import SearchError, abbreviate, check_installed, is_installed
 from metaheuristics.interface import Algorithm, ConstraintHandling
-from metaheuristics.settings import check_installed, is_installed
 
 T = TypeVar("T")
 

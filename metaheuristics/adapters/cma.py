@@ -5,9 +5,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from metaheuristics.errors import check_count, check_number
 from metaheuristics.interface import Array, PopulationSearch, Rule, Start
 from metaheuristics.preparation import UnitCube
-from metaheuristics.settings import check_count, check_number
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

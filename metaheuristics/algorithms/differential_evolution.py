@@ -7,21 +7,15 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from metaheuristics.algorithms.points import Points
-from metaheuristics.interface import Array, PopulationSearch, Rule, Start
-from metaheuristics.settings import bad_setting, check_count, check_number
+from metaheuristics.errors import bad_setting, check_count, check_number
+from metaheuristics.interface import Array, Points, PopulationSearch, Rule, Start
 
-# Mutants (P, n) of the members x (P, n), the best member (n,), others drawn for each member r (5, P, n), and the weight F.
-MUTATIONS: Mapping[str, Callable[[Array, Array, Array, float], Array]] = {
-    "best1": lambda x, best, r, F: best + F * (r[0] - r[1]),
-    "best2": lambda x, best, r, F: best + F * (r[0] + r[1] - r[2] - r[3]),
-    "currenttobest1": lambda x, best, r, F: x + F * (best - x + r[0] - r[1]),
-    "rand1": lambda x, best, r, F: r[0] + F * (r[1] - r[2]),
-    "rand2": lambda x, best, r, F: r[0] + F * (r[1] + r[2] - r[3] - r[4]),
-    "randtobest1": lambda x, best, r, F: r[0] + F * (best - r[0]) + F * (r[1] - r[2]),
+# Mutants (P, n) of the best member (n,), others drawn for each member r (5, P, n), and the weight F.
+STRATEGIES: Mapping[str, Callable[[Array, Array, float], Array]] = {
+    "best1bin": lambda best, r, F: best + F * (r[0] - r[1]),
+    "rand1bin": lambda best, r, F: r[0] + F * (r[1] - r[2]),
 }
-STRATEGIES = tuple(f"{mutation}{crossover}" for mutation in MUTATIONS for crossover in ("bin", "exp"))
-MOST_OTHERS = 5
+OTHERS = 5  # SciPy draws as many for every strategy
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -38,7 +32,7 @@ class DifferentialEvolution:
 
     #: Members. SciPy's default is 15 for each variable; 50 is what the other algorithms here have
     population: int = 50
-    #: Mutation and crossover, binomial or exponential, as SciPy names them
+    #: Mutation from the best member or a random one, with binomial crossover, as SciPy names them
     strategy: str = "best1bin"
     #: Least weight of a difference; the weight is drawn again for each generation
     mutation_low: float = 0.5
@@ -49,7 +43,7 @@ class DifferentialEvolution:
     def __post_init__(self) -> None:
         if self.strategy not in STRATEGIES:
             raise bad_setting(self, "strategy", f"one of {', '.join(STRATEGIES)}")
-        check_count(self, "population", at_least=MOST_OTHERS + self.strategy.startswith("rand2"))
+        check_count(self, "population", at_least=OTHERS)
         check_number(self, "mutation_low", at_least=0.0, at_most=self.mutation_high)
         check_number(self, "mutation_high", above=0.0, at_most=1.99)
         check_number(self, "recombination", at_least=0.0, at_most=1.0)
@@ -58,21 +52,10 @@ class DifferentialEvolution:
         return _DifferentialEvolutionSearch(self, start)
 
 
-def cross_over(
-    members: Array, mutants: Array, first: NDArray[np.int64], draws: NDArray[np.bool_], exponential: bool
-) -> Array:
-    """Return trials (P, n) that take the variables `first` (P,) from their mutants (P, n), and others of their members at random.
-
-    Draws (P, n) are True where a variable is to be crossed. An exponential crossover takes variables in a row, cyclically from
-    the first one, until one is not to be crossed.
-    """
+def cross_over(members: Array, mutants: Array, first: NDArray[np.int64], draws: NDArray[np.bool_]) -> Array:
+    """Return trials (P, n) that take the variables `first` (P,), and where draws (P, n) are True, from their mutants (P, n)."""
     taken = draws.copy()
-    if exponential:
-        taken[:, 0] = True
-        places = (first[:, None] + np.arange(members.shape[1])) % members.shape[1]
-        np.put_along_axis(taken, places, np.logical_and.accumulate(taken, axis=1), axis=1)
-    else:
-        taken[np.arange(len(members)), first] = True
+    taken[np.arange(len(members)), first] = True
     return np.where(taken, mutants, members)
 
 
@@ -99,10 +82,10 @@ class _DifferentialEvolutionSearch(PopulationSearch[DifferentialEvolution]):
 
         weight = rng.uniform(settings.mutation_low, settings.mutation_high)
         others = members[self._others(len(members)).T]
-        mutants = MUTATIONS[settings.strategy[:-3]](members, members[0], others, weight)
+        mutants = STRATEGIES[settings.strategy](members[0], others, weight)
         first = rng.integers(members.shape[1], size=len(members))
         draws = rng.uniform(size=members.shape) < settings.recombination
-        trials = cross_over(members, mutants, first, draws, settings.strategy.endswith("exp"))
+        trials = cross_over(members, mutants, first, draws)
         beyond = (trials < 0.0) | (trials > 1.0)
         trials[beyond] = rng.uniform(size=np.count_nonzero(beyond))
         return np.clip(middle + (trials - 0.5) * width, start.lower, start.upper)
@@ -113,8 +96,8 @@ class _DifferentialEvolutionSearch(PopulationSearch[DifferentialEvolution]):
         rows = []
         for member in range(count):
             self._start.rng.shuffle(order)
-            drawn = order[: MOST_OTHERS + 1]
-            rows.append(drawn[drawn != member][:MOST_OTHERS])
+            drawn = order[: OTHERS + 1]
+            rows.append(drawn[drawn != member][:OTHERS])
         return np.array(rows)
 
 
@@ -243,7 +226,7 @@ class _LShadeSearch(PopulationSearch[LShade]):
         mutants = np.where(mutants < start.lower, (start.lower + X) / 2, mutants)
         mutants = np.where(mutants > start.upper, (start.upper + X) / 2, mutants)
         draws = rng.random((count, n)) < self._CR[:, None]
-        trials = cross_over(X, mutants, rng.integers(n, size=len(X)), draws, exponential=False)
+        trials = cross_over(X, mutants, rng.integers(n, size=len(X)), draws)
         return np.clip(trials, start.lower, start.upper)
 
 

@@ -10,9 +10,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from metaheuristics.algorithms.points import Points
-from metaheuristics.interface import Array, PopulationSearch, Rule, Start
-from metaheuristics.settings import bad_setting, check_count, check_number
+from metaheuristics.errors import bad_setting, check_count, check_number
+from metaheuristics.interface import Array, Points, PopulationSearch, Rule, Start
 
 _CLOSE = 1e-14  # parents nearer than this share of the range count as equal, as in Deb's code
 

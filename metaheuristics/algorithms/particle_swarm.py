@@ -5,9 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from metaheuristics.algorithms.points import Points
-from metaheuristics.interface import Array, PopulationSearch, Rule, Start
-from metaheuristics.settings import check_count, check_number
+from metaheuristics.errors import check_count, check_number
+from metaheuristics.interface import Array, Points, PopulationSearch, Rule, Start
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from metaheuristics.errors import check_count
 from metaheuristics.interface import Array, PopulationSearch, Rule, Start
-from metaheuristics.settings import check_count
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -15,8 +15,7 @@ from metaheuristics.algorithms.genetic import (
     mutate_polynomially,
 )
 from metaheuristics.algorithms.particle_swarm import ParticleSwarm
-from metaheuristics.algorithms.points import Points
-from metaheuristics.interface import FEASIBILITY, Start
+from metaheuristics.interface import FEASIBILITY, Points, Start
 
 WIDE = 1e9  # bounds so far away that they do not bend a distribution
 

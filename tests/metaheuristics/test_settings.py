@@ -28,7 +28,7 @@ from metaheuristics.adapters.cma import CmaEs
 from metaheuristics.adapters.pymoo import Pymoo
 from metaheuristics.algorithms.differential_evolution import DifferentialEvolution, LShade
 from metaheuristics.algorithms.genetic import GoswamiGeneticAlgorithm
-from metaheuristics.settings import check_installed
+from metaheuristics.errors import check_installed
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,6 @@ from metaheuristics.settings import check_installed
         (AntColonyGrid, {"evaporation": 0.0}, "evaporation"),
         (AntColonyGrid, {"population": 4, "depositors": 6}, "depositors must be .* <= 5"),
         (DifferentialEvolution, {"population": 4}, "population must be a whole number >= 5"),
-        (DifferentialEvolution, {"strategy": "rand2bin", "population": 5}, "population must be a whole number >= 6"),
         (DifferentialEvolution, {"mutation_low": 1.2}, "mutation_low must be .* <= 1.0"),
         (LShade, {"population": 3}, "LShade: population must be a whole number >= 4, got 3"),
         (LShade, {"best": 0.0}, "best must be a finite number > 0.0 and <= 1.0, got 0.0"),
@@ -101,7 +100,7 @@ def test_the_settings_of_goswami_2008() -> None:
 
 
 def test_pycma_without_docstrings_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("metaheuristics.settings.is_installed", lambda package: True)
+    monkeypatch.setattr("metaheuristics.errors.is_installed", lambda package: True)
     monkeypatch.setattr(sys, "flags", SimpleNamespace(optimize=2))
     with pytest.raises(SearchError, match="PYTHONOPTIMIZE"):
         check_installed("cma", "cma")
