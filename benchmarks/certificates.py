@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 import nlp_gait
-from compare.papers.walk12.walk12 import TABLE_3
+from compare.papers.walk12.results import TABLE_3
 from compare.questions.certainty import MOST_VARIABLES
 from nlp_gait.files import write_json
 from nlp_gait.formulation import Array, GaitProblem

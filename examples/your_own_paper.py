@@ -15,14 +15,13 @@ import numpy as np
 from your_own_problem import walker
 
 from compare.analysis.record_statistics import approximate_rank_sum
-from compare.papers.paper import Paper, read_book
+from compare.papers.paper import Paper
 from compare.papers.paper_runs import Effort, Runner, choose_best, evaluate_point, make_search_tasks, make_start_tasks
 from compare.papers.rules import Found
 from compare.report.document import Figure
 from compare.study.run import ProblemSpec
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
 
-BOOK = read_book(__file__)
 PRINTED_X = (0.18, 0.13, -0.27, 0.006, 0.57)
 WALKER = walker()
 SPEEDS_M_S = (0.4, 0.5, 0.6)
@@ -59,10 +58,7 @@ def compare_searches(found):
 
 
 # %%
-# A function for each id of the table, and what the page shows beside the claims.
-
-BOOK.bind({"power": lambda found: evaluate_point(found.spec, PRINTED_X)["power"], "faster": list_powers})
-BOOK.bind({"better": compare_searches}, runs=True)
+# What the page shows beside the claims, and a function for each id of the table.
 
 
 def show(results):
@@ -73,8 +69,9 @@ def show(results):
 
 
 REPRODUCTION = Paper(
-    book=BOOK, title="A made-up paper", full=Effort(runs=11), quick=Effort(), readings={"as printed": "as printed"},
-    compute=compute, headlines=("power", "faster", "better"), show=show)  # fmt: skip
+    module=__file__, title="A made-up paper", full=Effort(runs=11), quick=Effort(), readings={"as printed": "as printed"},
+    compute=compute, headlines=("power", "faster", "better"), show=show, numbers_of_runs={"better": compare_searches},
+    numbers={"power": lambda found: evaluate_point(found.spec, PRINTED_X)["power"], "faster": list_powers})  # fmt: skip
 
 # %%
 # The same as the command, without the searches.

@@ -30,5 +30,4 @@ def load_reproduction(paper: str) -> Paper[Any, Any]:
         return reproduction
     if paper not in REPRODUCTIONS:
         raise unknown("reproduction", paper, REPRODUCTIONS)
-    registered: Paper[Any, Any] = import_module(f"compare.papers.{paper}.{paper}").REPRODUCTION
-    return registered
+    return import_module(f"compare.papers.{paper}.{paper}").REPRODUCTION

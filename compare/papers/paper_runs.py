@@ -85,11 +85,16 @@ def make_computation(
 
 
 def make_start_tasks(
-    problem: ProblemSpec, count: int, *, seed: int = 0, settings: Mapping[str, Any] | None = None
+    problem: ProblemSpec,
+    count: int,
+    *,
+    first: Sequence[Mapping[str, float]] = (),
+    seed: int = 0,
+    settings: Mapping[str, Any] | None = None,
 ) -> list[Run]:
-    """Return tasks of IPOPT from random points, drawn from one seed as by ``nlp_gait.solve``."""
+    """Return tasks of IPOPT from the first points, then from random ones, drawn from one seed as by ``nlp_gait.solve``."""
     model, rng = problem.load(), np.random.default_rng(seed)
-    points = [model.by_name(model.start_point(rng)) for _ in range(count)]
+    points = [*first, *(model.by_name(model.start_point(rng)) for _ in range(count))]
     return [
         Run(problem=problem, solver=IPOPT, settings=settings or {}, seed=seed, number=run, start=point)
         for run, point in enumerate(points)
@@ -109,41 +114,33 @@ def _build(name: str | GaitProblem, options: tuple[tuple[str, Any], ...]) -> tup
     return problem, build_exact_model(problem)
 
 
-@cache
-def _evaluate(name: str | GaitProblem, options: Any, values: Any, x: tuple[float, ...]) -> Mapping[str, float]:
-    problem, model = _build(name, options)
-    point = model.at(problem.check_x(x), problem.with_values(**dict(values)).p)
-    return {problem.objective.name: problem.objective.sign * point.cost, **point.indexes}
-
-
 def evaluate_point(spec: ProblemSpec, x: Sequence[float]) -> Mapping[str, float]:
     """Return objective and performance indexes at x (n,) by the exact functions, which are built once for equal options."""
-    return _evaluate(spec.name, *(tuple(sorted(values.items())) for values in (spec.options, spec.values)), tuple(x))
+    problem, model = _build(spec.name, tuple(sorted(spec.options.items())))
+    point = model.at(problem.check_x(x), problem.with_values(**spec.values).p)
+    return {problem.objective.name: problem.objective.sign * point.cost, **point.indexes}
 
 
 def collect_cloud(spec: ProblemSpec, algorithm: str, evaluations: int, seed: int = 0) -> list[list[float]]:
     """Return variables and objective (n + 1,) of feasible points in the order of a search, at most ``CLOUD`` of them."""
-    found = list[Array]()
+    parts = list[Array]()
     minimize(
         compile_objective(spec.load(), threads=1),
         make_algorithm(algorithm),
         evaluations=evaluations,
         seed=seed,
-        callback=lambda X, f, violation: found.append(np.column_stack([X, f])[violation <= 0.0]),
+        callback=lambda X, f, violation: parts.append(np.column_stack([X, f])[violation <= 0.0]),
     )
-    points = np.concatenate(found)
-    return (
-        [points[k].tolist() for k in np.unique(np.linspace(0, len(points) - 1, CLOUD).astype(int))]
-        if len(points)
-        else []
-    )
+    points = np.concatenate(parts)
+    chosen = np.unique(np.linspace(0, len(points) - 1, min(CLOUD, len(points))).astype(int))
+    return [points[k].tolist() for k in chosen]
 
 
 def simulate_point(spec: ProblemSpec, x: Sequence[float]) -> dict[str, float | None]:
     """Return what the engine measures of a gait that drives follow open loop; nothing without MuJoCo.
 
-    Time of a fall [s], None without one; largest tilt [deg], slip [m], landing error [m], rise of the torso [m], number of joints
-    outside their limits, energy of the drives [J], and power with heat by that of the model [%].
+    Time of a fall [s], None without one; largest tilt [deg], landing error [m], rise of the torso [m], and the number of joints
+    outside their limits.
     """
     if find_spec("mujoco") is None:
         return {}
@@ -159,12 +156,9 @@ def simulate_point(spec: ProblemSpec, x: Sequence[float]) -> dict[str, float | N
     return {
         "fell_at_s": measured.fell_at_s,
         "tilt_deg": measured.largest_tilt_deg,
-        "slip_m": measured.slip_m,
         "landing_m": max((landing.error_m for landing in measured.landings.values()), default=0.0),
         "rise_m": float(simulation.torso[-1, 2] - simulation.torso[0, 2]),
         "outside": len(measured.joint_limits),
-        "energy_J": measured.measured.mechanical_W * plan.duration_s,
-        "power_%": 100 * measured.measured.total_W / measured.predicted.total_W,
     }
 
 
@@ -197,21 +191,6 @@ def choose_best(records: Iterable[RunRecord]) -> RunRecord:
         return not record.reported_feasible, not record.feasible, by
 
     return min(records, key=rank)
-
-
-def read_objective(record: RunRecord) -> float:
-    """Return the exact objective at the end of a run."""
-    return record.objective
-
-
-def read_index(record: RunRecord, name: str) -> float:
-    """Return an exact performance index at the end of a run."""
-    return record.metrics[name]
-
-
-def get_point(record: RunRecord) -> list[float]:
-    """Return x in the problem's order."""
-    return list(record.x.values())
 
 
 def get_history(record: RunRecord, points: int) -> Array:

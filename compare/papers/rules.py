@@ -88,8 +88,6 @@ class ClaimRow:
             raise ValueError(f"{self.id}: the rule {self.rule!r} needs a number")
         if unit not in ("", "%", self.unit):
             raise ValueError(f"{self.id}: the rule's unit is {unit!r}, the row's {self.unit!r}")
-        if kind in ("within", "same order", "rank"):
-            self.values  # noqa: B018, which raises without a number
 
     @property
     def parts(self) -> tuple[str, float | None, str]:
@@ -121,13 +119,10 @@ def judge(claim: ClaimRow, value: Any) -> Judgement:
 def compare_alternatives(choice: str, judged: Mapping[str, Judgement]) -> Judgement:
     """Return the common result of alternatives, or that it depends on their choice, with each of them."""
     first = next(iter(judged.values()))
+    if len(judged) == 1:
+        return first
     if all(one.verdict is first.verdict for one in judged.values()):
-        here = {one.here for one in judged.values()}
-        return (
-            first
-            if len(here) == 1
-            else Judgement(first.verdict, "; ".join(f"{k}: {v.here}" for k, v in judged.items()))
-        )
+        return Judgement(first.verdict, "; ".join(f"{label}: {one.here}" for label, one in judged.items()))
     words = "; ".join(f"{label}: {one.verdict} ({one.here})" for label, one in judged.items())
     return Judgement(Ruling.DEPENDS, f"on {choice}: {words}")
 

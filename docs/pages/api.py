@@ -39,7 +39,7 @@ DOORS = {
     "compare.analysis.comparison": ("Comparison", "SolverRuns", "compare_problems"),
     "compare.analysis.columns": ("Column", "format_rows", "summarise"),
     "compare.analysis.record_statistics": ("approximate_rank_sum",),
-    "compare.papers.paper": ("Book", "Paper", "read_book"),
+    "compare.papers.paper": ("DifferenceRow", "Paper"),
     "compare.papers.paper_runs": (
         *("Effort", "Runner", "choose_best", "evaluate_point", "make_computation", "make_search_tasks"),
         *("make_start_tasks", "tabulate"),

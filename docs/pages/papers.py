@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from compare.papers import REPRODUCTIONS, load_reproduction
-from compare.papers.paper import count_results
 from compare.study.citations import find_citations
 from docs.pages.markdown import literal, page, table, write_all
 
@@ -26,6 +26,12 @@ def read_record(name: str) -> dict[str, Any]:
     """Return the recorded reproduction of a paper."""
     record: dict[str, Any] = json.loads((RECORDS / f"{name}.json").read_text(encoding="utf-8"))
     return record
+
+
+def count_results(results: Mapping[str, str]) -> str:
+    """Return a sentence with the number of claims by result."""
+    words = ", ".join(f'{n} "{word}"' for word, n in Counter(results.values()).most_common())
+    return f"{len(results)} claims: {words}."
 
 
 def list_page() -> str:

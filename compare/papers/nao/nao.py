@@ -7,21 +7,23 @@ the printed margins; the physical one takes ten intervals and physical gravity.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from compare.analysis.record_statistics import approximate_rank_sum
+from compare.papers.nao.page import compute_misfit, show
 from compare.papers.nao.results import (
     COMPARED,
     HIPS_M,
-    KINDS,
+    INDEXES,
     MARGINS,
     OPEN_GA,
     PHASES,
     PHYSICAL,
-    PRINTED,
+    PRINTED_OPTIONS,
     PRINTED_X,
     READINGS,
     RECONSTRUCTED,
@@ -33,24 +35,26 @@ from compare.papers.nao.results import (
     compute,
     make_spec,
 )
-from compare.papers.nao.tables import compute_powers, list_errors, list_levels, list_margins, show
-from compare.papers.paper import Paper, parse_settings, read_book
+from compare.papers.paper import DifferenceRow, Paper
 from compare.papers.paper_runs import evaluate_point
 from compare.papers.rules import Found
-from nlp_gait.formulation.signals import Signals
 from nlp_gait.gaits.nao.joints import measure_leg
 from nlp_gait.robots import load_robot
 
-BOOK = read_book(__file__)
+KINDS = {"power": "power_W", "torque": "torque_change_Nm"}
 TEST_RUNS = 11  # of each search in the paper's tests
 PACES = 9  # durations at which a printed gait is evaluated
-FORWARD_M_S, LATERAL = (
-    (0.008, 0.02, 0.05),
-    (1.0, 1.5, 2.0),
-)  # forward velocities; lateral ones as multiples of the printed
+FORWARD_M_S = (0.008, 0.02, 0.05)
+LATERAL = (1.0, 1.5, 2.0)  # multiples of the printed lateral velocities
 MISFIT_MM = 1.0  # of a margin, ten printed digits: a reading that misses by more is excluded
 FALLEN_DEG = 90.0
-Change = Callable[[NaoResults, str], dict[str, float]]
+STRAIGHT = {"hip_vz_start_m_s": 0.0, "hip_vz_end_m_s": 0.0}  # a hip without vertical motion
+HIGHEST = {"hip_height_m": HIPS_M[-1]}
+
+
+def list_levels(result: NaoResults, phase: str, kind: str) -> list[float]:
+    """Return the power [W] or the torque change [Nm] of both printed solutions."""
+    return [result.measure(phase, search)[KINDS[kind]] for search in SEARCHES]
 
 
 def compute_lead(result: NaoResults, phase: str, kind: str) -> float:
@@ -59,10 +63,21 @@ def compute_lead(result: NaoResults, phase: str, kind: str) -> float:
     return 1000 * (ga - pso)
 
 
+def list_margins(result: NaoResults, phase: str, indexes: Sequence[str] = MARGINS) -> list[float]:
+    """Return margins of both printed solutions [mm]."""
+    return [1000 * result.measure(phase, search)[index] for search in SEARCHES for index in indexes]
+
+
 def list_leads(result: NaoResults, phase: str, indexes: Sequence[str]) -> list[float]:
     """Return margins of PSO's printed solution less those of GA's [mm], as many digits as in print."""
     pso, ga = (result.measure(phase, search) for search in SEARCHES)
     return [round(1000 * (pso[index] - ga[index]), 1) for index in indexes]
+
+
+def compute_excess(result: NaoResults, phase: str) -> float | None:
+    """Return the power of PSO's printed solution above the optimum [%]; None without a feasible optimum."""
+    best = result.best(make_spec(phase, result.reading))
+    return 100 * (result.measure(phase)["power_W"] / best.objective - 1) if best.feasible else None
 
 
 def list_powers(result: NaoResults, what: str, phase: str) -> list[float] | None:
@@ -71,67 +86,49 @@ def list_powers(result: NaoResults, what: str, phase: str) -> list[float] | None
     return powers if len(powers) > 1 else None
 
 
-def list_pairs(result: NaoResults, before: Change, after: Change, indexes: Sequence[str]) -> list[list[float]]:
-    """Return power [W] or margins [mm] of PSO's printed solution under two changes, in both phases."""
-    return [
-        [
-            (1.0 if index == "power_W" else 1000.0) * result.measure(phase, **change(result, phase))[index]
-            for change in (before, after)
-        ]
-        for phase in PHASES
-        for index in indexes
-    ]
-
-
-def keep(result: NaoResults, phase: str) -> dict[str, float]:
-    """Return no change."""
-    return {}
-
-
-def remove_oscillation(result: NaoResults, phase: str) -> dict[str, float]:
-    """Return the change to a hip without vertical motion."""
-    return {"hip_vz_start_m_s": 0.0, "hip_vz_end_m_s": 0.0}
-
-
-def choose_lowest_hip(result: NaoResults, phase: str) -> dict[str, float]:
+def choose_lowest(result: NaoResults, phase: str) -> dict[str, float]:
     """Return the change to the lowest hip of the sweep at which there is a gait."""
     return {"hip_height_m": result.sweep("hip", phase)[0][0]}
 
 
-def compute_root_mean(signals: Signals, kind: str = "") -> float:
-    """Return the rms torque over samples and joints of a kind [Nm]."""
+def list_pairs(result: NaoResults, before: Any, after: Any, kinds: Sequence[str]) -> list[list[float]]:
+    """Return kinds of figures of PSO's printed solution under two changes, in both phases, see ``measure_change``.
+
+    A change is values of variables by name, or a function that returns them.
+    """
+    return [
+        [measure_change(result, phase, change, kind) for change in (before, after)]
+        for phase in PHASES
+        for kind in kinds
+    ]
+
+
+def measure_change(
+    result: NaoResults, phase: str, change: Mapping[str, float] | Callable[..., Mapping[str, float]], kind: str
+) -> float:
+    """Return power [W] or a margin [mm] of PSO's changed solution, or the rms torque of the joints of a kind [Nm]; "": of all."""
+    values = change(result, phase) if callable(change) else change
+    if kind in INDEXES:
+        return (1.0 if kind == "power_W" else 1000.0) * result.measure(phase, **values)[kind]
+    signals = result.sample(phase, **values)
     columns = [name[1:].startswith(kind) for name in signals.joints]
     return float(np.sqrt(np.mean(np.square(signals.arrays["tau"][:, columns]))))
 
 
-def list_oscillation_torques(result: NaoResults) -> list[list[float]]:
-    """Return the rms torque without vertical motion of the hip, and as printed, in both phases [Nm]."""
-    changes = [[change(result, phase) for change in (remove_oscillation, keep)] for phase in PHASES]
-    pairs = zip(PHASES, changes, strict=True)
-    return [[compute_root_mean(result.sample(phase, **change)) for change in pair] for phase, pair in pairs]
-
-
-def list_relief(result: NaoResults) -> list[list[float]]:
-    """Return the rms torque of knees and ankles with the lowest and the highest hip, in both phases [Nm]."""
-    highest = {"hip_height_m": HIPS_M[-1]}
-    ends = [
-        [result.sample(phase, **change) for change in (choose_lowest_hip(result, phase), highest)] for phase in PHASES
-    ]
-    return [[compute_root_mean(end, kind) for end in pair] for pair in ends for kind in ("Knee", "Ankle")]
-
-
-def list_hip_ranges(result: NaoResults, searches: Sequence[str]) -> list[float]:
+def list_hip_ranges(result: NaoResults, searches: Iterable[str]) -> list[float]:
     """Return the vertical range of the hip in single support [mm]."""
     return [1000 * float(np.ptp(result.sample("ssp", search).arrays["hip"][:, 2])) for search in searches]
 
 
 def list_swing_shares(result: NaoResults) -> list[float]:
     """Return the share of the swing leg in the power of the hips, with heat, and of its mechanical part [%]."""
-    mechanical, heat = compute_powers(result)
-    both = {joint: power + heat[joint] for joint, power in mechanical.items()}
+    signals, problem = result.sample("ssp"), make_spec("ssp", result.reading).load()
+    t, tau, qd = (signals.arrays[name] for name in ("t", "tau", "qd"))
+    mechanical, heat = np.abs(tau * qd), problem.value("heat_loss_W_per_Nm2") * tau**2
     shares = []
-    for drawn in (both, mechanical):
-        swing, support = (sum(drawn[f"{side}Hip{axis}"] for axis in ("Roll", "Pitch")) for side in "RL")
+    for power in (mechanical + heat, mechanical):
+        energies = dict(zip(signals.joints, np.trapezoid(power, t, axis=0), strict=True))
+        swing, support = (sum(energies[f"{side}Hip{axis}"] for axis in ("Roll", "Pitch")) for side in "RL")
         shares.append(100 * swing / (swing + support))
     return shares
 
@@ -156,11 +153,16 @@ def compute_pace_loss(result: NaoResults, phase: str, end: int) -> float:
     return 100 * (1 - margins[end] / max(margins))
 
 
+def change_lateral(factor: float) -> dict[str, float]:
+    """Return the lateral velocities of PSO's printed single support times a factor."""
+    x6, x7 = PRINTED_X["ssp", "PSO"][5:7]
+    return {"hip_vy_start_m_s": factor * x6, "hip_vy_end_m_s": factor * x7}
+
+
 def compute_lateral_gain(result: NaoResults) -> float:
     """Return the change of the mean margin in y with half the lateral velocities [mm]."""
-    x6, x7 = PRINTED_X["ssp", "PSO"][5:7]
-    halved = result.measure("ssp", hip_vy_start_m_s=x6 / 2, hip_vy_end_m_s=x7 / 2)
-    return 1000 * (result.measure("ssp")["dbm_y_mean_m"] - halved["dbm_y_mean_m"])
+    printed, halved = (result.measure("ssp", **change_lateral(k))["dbm_y_mean_m"] for k in (1.0, 0.5))
+    return 1000 * (printed - halved)
 
 
 def list_arm_gains(result: NaoResults) -> list[float]:
@@ -169,9 +171,10 @@ def list_arm_gains(result: NaoResults) -> list[float]:
     return [max(1000 * (result.measure(phase)[index] - held[phase][index]) for index in MARGINS) for phase in PHASES]
 
 
-def compute_test(rank_sum: int, runs: int = TEST_RUNS) -> list[float]:
-    """Return z, the two-sided and the one-sided p-value of a rank sum of as many runs each."""
-    z = (rank_sum - runs * (2 * runs + 1) / 2 + 0.5) / math.sqrt(runs**2 * (2 * runs + 1) / 12)
+def compute_test(rank_sum: int) -> list[float]:
+    """Return z, the two-sided and the one-sided p-value of a rank sum of 11 runs each."""
+    n = TEST_RUNS
+    z = (rank_sum - n * (2 * n + 1) / 2 + 0.5) / math.sqrt(n**2 * (2 * n + 1) / 12)
     p = math.erfc(abs(z) / math.sqrt(2))
     return [z, p, p / 2]
 
@@ -191,36 +194,23 @@ def count_found_optima(result: NaoResults, phase: str) -> list[list[int]]:
     return [[sum(found[k : k + TEST_RUNS]) for k in range(0, len(found) - TEST_RUNS + 1, TEST_RUNS)] or [sum(found)]]
 
 
-def compute_swing_price(result: NaoResults, search: str, height_m: float, other_m: float) -> float:
+def list_swing_price(result: NaoResults, search: str, height_m: float, other_m: float) -> list[float]:
     """Return the power of a search's printed solution at a swing height above that of PSO's at another one [%]."""
-    power, reference = (
-        result.measure("ssp", name, swing_height_m=h)["power_W"] for name, h in ((search, height_m), ("PSO", other_m))
-    )
-    return 100 * (power / reference - 1)
+    power = result.measure("ssp", search, swing_height_m=height_m)["power_W"]
+    return [100 * (power / result.measure("ssp", swing_height_m=other_m)["power_W"] - 1)]
 
 
 def list_simulated(result: NaoResults, key: str) -> list[float] | None:
-    """Return a number of the simulated printed solutions; None without MuJoCo."""
+    """Return a number of the simulated printed solutions, of the tilt of one that fell 90 degrees; None without MuJoCo."""
     runs = [result.computed[f"simulation-{phase}-{search}"] for phase in PHASES for search in SEARCHES]
-    return [run[key] for run in runs] if all(runs) else None
-
-
-def list_tilts(result: NaoResults) -> list[float] | None:
-    """Return the largest tilt of the printed solutions in the engine [deg]; 90 after a fall."""
-    falls, tilts = (list_simulated(result, key) for key in ("fell_at_s", "tilt_deg"))
-    return tilts and [t if fall is None else FALLEN_DEG for fall, t in zip(falls or [], tilts, strict=True)]
+    fallen = {"tilt_deg": FALLEN_DEG}
+    return [run[key] if run["fell_at_s"] is None else fallen.get(key, run[key]) for run in runs] if all(runs) else None
 
 
 def list_faster(result: NaoResults) -> list[list[float]]:
     """Return the power of PSO's printed single support at larger forward velocities at its start, and at its end [W]."""
     names = ("hip_vx_start_m_s", "hip_vx_end_m_s")
     return [[result.measure("ssp", **{name: v})["power_W"] for v in FORWARD_M_S] for name in names]
-
-
-def list_wider(result: NaoResults) -> list[float]:
-    """Return the power of PSO's printed single support at larger lateral velocities [W]."""
-    x6, x7 = PRINTED_X["ssp", "PSO"][5:7]
-    return [result.measure("ssp", hip_vy_start_m_s=k * x6, hip_vy_end_m_s=k * x7)["power_W"] for k in LATERAL]
 
 
 def count_gaps(result: NaoResults) -> int | None:
@@ -247,11 +237,11 @@ def compute_speed_gain(result: NaoResults) -> float:
 
 def list_excluded(results: Mapping[str, NaoResults]) -> dict[str, str]:
     """Return why the print excludes readings."""
-    reasons, errors = {}, {name: max(map(abs, list_errors(results[name], "ssp"))) for name in READINGS}
-    if errors[PHYSICAL] > MISFIT_MM:
+    reasons, physical = dict[str, str](), compute_misfit("ssp")
+    if physical > MISFIT_MM:
         reasons[PHYSICAL] = (
-            f"its margins of single support miss the printed ones by up to {errors[PHYSICAL]:.1f} mm, those of the "
-            f"reconstructed reading by {errors[RECONSTRUCTED]:.2f} mm"
+            f"its margins of single support miss the printed ones by up to {physical:.1f} mm, those of the "
+            f"reconstructed reading by {compute_misfit('ssp', **PRINTED_OPTIONS):.2f} mm"
         )
     if "constant" in results:
         powers, printed = results["constant"].final_powers("ssp", "PSO"), results["constant"].measure("ssp")["power_W"]
@@ -263,80 +253,19 @@ def list_excluded(results: Mapping[str, NaoResults]) -> dict[str, str]:
     return reasons
 
 
-for _phase in PHASES:
-    BOOK.bind(
-        {
-            f"margins-{_phase}": partial(list_margins, phase=_phase),
-            f"pso-optimal-{_phase}": partial(NaoResults.excess, phase=_phase),
-            f"higher-hip-{_phase}": partial(list_powers, what="hip", phase=_phase),
-            f"slower-{_phase}": partial(list_powers, what="time", phase=_phase),
-            f"too-fast-{_phase}": partial(compute_pace_loss, phase=_phase, end=0),
-            f"too-slow-{_phase}": partial(compute_pace_loss, phase=_phase, end=-1),
-            **{f"{kind}-level-{_phase}": partial(list_levels, phase=_phase, kind=kind) for kind in KINDS},
-            **{f"{kind}-lead-{_phase}": partial(compute_lead, phase=_phase, kind=kind) for kind in KINDS},
-        }
-    )
-    BOOK.bind({f"better-{_phase}": partial(compare_searches, phase=_phase)}, runs=True)
-    BOOK.bind({f"same-optimum-{_phase}": partial(count_found_optima, phase=_phase)}, runs=True)
-BOOK.bind(
-    {
-        "least-margins-dsp": lambda r: list_margins(r, "dsp", MARGINS[:2]),
-        "mean-x-lead-ssp": lambda r: list_leads(r, "ssp", MARGINS[2:3]),
-        "least-leads-ssp": lambda r: list_leads(r, "ssp", MARGINS[:2]),
-        "margin-leads-dsp": lambda r: list_leads(r, "dsp", MARGINS),
-        "more-stable": lambda r: [1000 * (r.measure("dsp")[index] - r.measure("ssp")[index]) for index in MARGINS],
-        "swing-beyond": lambda r: list_powers(r, "swing", "ssp"),
-        "lower-hip-x": lambda r: list_pairs(r, keep, choose_lowest_hip, MARGINS[:1]),
-        "lower-hip-y": lambda r: list_pairs(r, keep, choose_lowest_hip, MARGINS[1:2]),
-        "straight": lambda r: list_pairs(r, keep, remove_oscillation, MARGINS[:2]),
-        "oscillation": lambda r: list_pairs(r, remove_oscillation, keep, ["power_W"]),
-        "oscillation-torque": list_oscillation_torques,
-        "relief": list_relief,
-        "few-mm": lambda r: list_hip_ranges(r, SEARCHES),
-        "hip-variation": lambda r: list_hip_ranges(r, SEARCHES[::-1]),
-        "swing-24": lambda r: [compute_swing_price(r, "PSO", 0.024, 0.015)],
-        "swing-28": lambda r: [compute_swing_price(r, "PSO", 0.028, 0.015)],
-        "swing-ga": lambda r: [compute_swing_price(r, "GA", 0.024, 0.024)],
-        "simulator": list_tilts,
-        "simulator-limits": lambda r: list_simulated(r, "outside"),
-        "forward-range": list_faster,
-        "lateral-range": list_wider,
-        "velocities-dsp": lambda r: list(r.best(make_spec("dsp", r.reading)).x.values())[3:5],
-        "gap-dsp": count_gaps,
-        "highest-hip": lambda r: compute_highest_hip(),
-        "faster-dsp": compute_speed_gain,
-        "swing-hip": list_swing_shares,
-        "swing-joints": list_swing_joints,
-        "lateral-margin": compute_lateral_gain,
-        "arms": list_arm_gains,
-        "statistic-ssp": lambda r: compute_test(70),
-        "statistic-dsp": lambda r: compute_test(90),
-    }
-)
-BOOK.bind({"torque-rank": lambda r: [run.metrics["torque_change_Nm"] for run in r.list_runs("ssp", "PSO")]}, runs=True)
-
-
-def measure_choice(results: Mapping[str, NaoResults], id: str) -> dict[str, float]:
+def measure_choice(row: DifferenceRow, results: Mapping[str, NaoResults]) -> dict[str, float]:
     """Return the largest error of the printed margins with one choice of the reconstructed reading alone [mm]."""
-    options, effects = parse_settings(BOOK.differences[id].option)[0], dict[str, float]()
-    kinds = {"ssp": ("margins of single support", MARGINS), "dsp": ("least margins of double support", MARGINS[:2])}
-    for phase in ("dsp",) if id == "masses" else PHASES:
-        (words, indexes), errors = kinds[phase], list[float]()
-        for search in SEARCHES:
-            figures = evaluate_point(make_spec(phase, PHYSICAL, **options), PRINTED_X[phase, search])
-            errors += [1000 * abs(figures[index] - PRINTED[phase, search][index]) for index in indexes]
-        effects[f"largest error of {words}, with this choice alone [mm]"] = max(errors)
-        for reading, what in ((PHYSICAL, "none"), (RECONSTRUCTED, "all")):
-            errors = list_errors(results[reading], phase, indexes)
-            effects[f"largest error of {words}, with {what} of the reconstructed reading [mm]"] = max(map(abs, errors))
-    return effects
+    words = {"ssp": "margins of single support", "dsp": "least margins of double support"}
+    if row.id == "masses":
+        del words["ssp"]
+    return {f"{text}, this choice alone [mm]": compute_misfit(phase, **row.options) for phase, text in words.items()}
 
 
-def measure_option(results: Mapping[str, NaoResults], id: str) -> dict[str, float]:
+def measure_option(row: DifferenceRow, results: Mapping[str, NaoResults]) -> dict[str, float]:
     """Return the changes of PSO's printed solutions with the option of a difference."""
-    options, effects = parse_settings(BOOK.differences[id].option)[0], dict[str, float]()
-    for phase in ("dsp",) if id in ("lever", "arms-shared") else PHASES:  # of double support alone
-        after = evaluate_point(make_spec(phase, RECONSTRUCTED, **options), PRINTED_X[phase, "PSO"])
+    effects = dict[str, float]()
+    for phase in ("dsp",) if row.id in ("lever", "arms-shared") else PHASES:  # of double support alone
+        after = evaluate_point(make_spec(phase, RECONSTRUCTED, **row.options), PRINTED_X[phase, "PSO"])
         before = results[RECONSTRUCTED].measure(phase)
         for name, index in zip(("power", "torque change"), KINDS.values(), strict=True):
             effects[f"{name} of {PHASES[phase]} [%]"] = 100 * (after[index] / before[index] - 1)
@@ -345,13 +274,58 @@ def measure_option(results: Mapping[str, NaoResults], id: str) -> dict[str, floa
     return effects
 
 
-BOOK.bind({id: partial(measure_choice, id=id) for id in ("zmp", "samples", "masses")})
-OPTIONAL = ("lever", "arms-shared", "finite", "robot", "separate", "held")
-BOOK.bind({id: partial(measure_option, id=id) for id in OPTIONAL})
-
+NUMBERS: dict[str, Callable[[NaoResults], Any]] = {
+    "least-margins-dsp": lambda r: list_margins(r, "dsp", MARGINS[:2]),
+    "mean-x-lead-ssp": lambda r: list_leads(r, "ssp", MARGINS[2:3]),
+    "least-leads-ssp": lambda r: list_leads(r, "ssp", MARGINS[:2]),
+    "margin-leads-dsp": lambda r: list_leads(r, "dsp", MARGINS),
+    "more-stable": lambda r: [1000 * (r.measure("dsp")[index] - r.measure("ssp")[index]) for index in MARGINS],
+    "swing-beyond": lambda r: list_powers(r, "swing", "ssp"),
+    "lower-hip-x": lambda r: list_pairs(r, {}, choose_lowest, MARGINS[:1]),
+    "lower-hip-y": lambda r: list_pairs(r, {}, choose_lowest, MARGINS[1:2]),
+    "straight": lambda r: list_pairs(r, {}, STRAIGHT, MARGINS[:2]),
+    "oscillation": lambda r: list_pairs(r, STRAIGHT, {}, ["power_W"]),
+    "oscillation-torque": lambda r: list_pairs(r, STRAIGHT, {}, [""]),
+    "relief": lambda r: list_pairs(r, choose_lowest, HIGHEST, ["Knee", "Ankle"]),
+    "few-mm": lambda r: list_hip_ranges(r, SEARCHES),
+    "hip-variation": lambda r: list_hip_ranges(r, reversed(SEARCHES)),
+    "swing-24": lambda r: list_swing_price(r, "PSO", 0.024, 0.015),
+    "swing-28": lambda r: list_swing_price(r, "PSO", 0.028, 0.015),
+    "swing-ga": lambda r: list_swing_price(r, "GA", 0.024, 0.024),
+    "simulator": lambda r: list_simulated(r, "tilt_deg"),
+    "simulator-limits": lambda r: list_simulated(r, "outside"),
+    "forward-range": list_faster,
+    "lateral-range": lambda r: [r.measure("ssp", **change_lateral(k))["power_W"] for k in LATERAL],
+    "velocities-dsp": lambda r: list(r.best(make_spec("dsp", r.reading)).x.values())[3:5],
+    "gap-dsp": count_gaps,
+    "highest-hip": lambda r: compute_highest_hip(),
+    "faster-dsp": compute_speed_gain,
+    "swing-hip": list_swing_shares,
+    "swing-joints": list_swing_joints,
+    "lateral-margin": compute_lateral_gain,
+    "arms": list_arm_gains,
+    "statistic-ssp": lambda r: compute_test(70),
+    "statistic-dsp": lambda r: compute_test(90),
+}
+NUMBERS_OF_RUNS: dict[str, Callable[[NaoResults], Any]] = {
+    "torque-rank": lambda r: [run.metrics["torque_change_Nm"] for run in r.list_runs("ssp", "PSO")]
+}
+for _phase in PHASES:
+    NUMBERS |= {
+        f"margins-{_phase}": partial(list_margins, phase=_phase),
+        f"pso-optimal-{_phase}": partial(compute_excess, phase=_phase),
+        f"higher-hip-{_phase}": partial(list_powers, what="hip", phase=_phase),
+        f"slower-{_phase}": partial(list_powers, what="time", phase=_phase),
+        f"too-fast-{_phase}": partial(compute_pace_loss, phase=_phase, end=0),
+        f"too-slow-{_phase}": partial(compute_pace_loss, phase=_phase, end=-1),
+        **{f"{kind}-level-{_phase}": partial(list_levels, phase=_phase, kind=kind) for kind in KINDS},
+        **{f"{kind}-lead-{_phase}": partial(compute_lead, phase=_phase, kind=kind) for kind in KINDS},
+    }
+    NUMBERS_OF_RUNS[f"better-{_phase}"] = partial(compare_searches, phase=_phase)
+    NUMBERS_OF_RUNS[f"same-optimum-{_phase}"] = partial(count_found_optima, phase=_phase)
 
 REPRODUCTION: Paper[NaoEffort, NaoResults] = Paper(
-    book=BOOK,
+    module=__file__,
     title="The gait cycle of NAO: Gupta, Pratihar, Deb (2023)",
     citation=(
         "P. Gupta, D. K. Pratihar, K. Deb: *Analysis and optimization of gait cycle of 25-DOF NAO robot using particle swarm "
@@ -364,6 +338,12 @@ REPRODUCTION: Paper[NaoEffort, NaoResults] = Paper(
     choices={name: OPEN_GA for name in ("all crossed", "one elite", "no elite", "penalty")},
     exclude=list_excluded,
     compute=compute,
+    numbers=NUMBERS,
+    numbers_of_runs=NUMBERS_OF_RUNS,
+    effects={
+        **dict.fromkeys(("zmp", "samples", "masses"), measure_choice),
+        **dict.fromkeys(("lever", "arms-shared", "finite", "robot", "separate", "held"), measure_option),
+    },
     headlines=(
         *("margins-ssp", "pso-optimal-ssp", "better-ssp", "better-dsp", "same-optimum-ssp"),
         *("swing-24", "swing-ga", "simulator", "power-level-ssp"),

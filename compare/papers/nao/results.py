@@ -34,17 +34,15 @@ from nlp_gait.formulation.signals import Signals
 
 FOLDER = Path(__file__).parent
 PENALTY_W = 100.0  # per unit of violation
-SOLUTIONS = FOLDER / "solutions.csv"
 PHASES = {"ssp": "single support", "dsp": "double support"}
 MARGINS = tuple(f"dbm_{axis}_{kind}_m" for kind in ("min", "mean") for axis in "xy")
-KINDS = {"power": "power_W", "torque": "torque_change_Nm"}
-INDEXES = (*KINDS.values(), *MARGINS)
+INDEXES = ("power_W", "torque_change_Nm", *MARGINS)
 RECONSTRUCTED, PHYSICAL = READINGS = {
     "reconstructed": "ten samples, (19) and (20) with g = 9.8, 23 masses in double support: what gives the printed margins",
     "physical": "ten intervals, physical gravity, all masses",
 }
 PRINTED_OPTIONS: Mapping[str, Any] = {"intervals": 9, "zmp_gravity": "printed"}
-SEARCHES = ("PSO", "GA")
+SEARCHES = {"PSO": "pso", "GA": "ga"}  # the latter names have colours
 # Searches by reading of the claims on runs: swarm, GA, and words. All are in the reconstructed reading.
 OPEN_GA = "the GA's settings"
 COMPARED = {
@@ -81,8 +79,9 @@ class NaoEffort(Effort):
 
 
 # Variables in the problem's order, and figures, of each printed solution
-PRINTED_X = {(row["phase"], row["search"]): tuple(map(float, row["x"].split())) for row in read_rows(SOLUTIONS)}
-PRINTED = {(row["phase"], row["search"]): {i: float(row[i]) for i in INDEXES} for row in read_rows(SOLUTIONS)}
+SOLUTIONS = {(row["phase"], row["search"]): row for row in read_rows(FOLDER / "solutions.csv")}
+PRINTED_X = {key: tuple(map(float, row["x"].split())) for key, row in SOLUTIONS.items()}
+PRINTED = {key: {index: float(row[index]) for index in INDEXES} for key, row in SOLUTIONS.items()}
 
 
 def make_spec(phase: str, reading: str, label: str = "", **options: Any) -> ProblemSpec:
@@ -92,16 +91,14 @@ def make_spec(phase: str, reading: str, label: str = "", **options: Any) -> Prob
     return ProblemSpec(name=f"nao-{phase}", options=chosen, label=f"nao-{phase}-{reading}{label}")
 
 
-def fix(spec: ProblemSpec, **variables: float) -> ProblemSpec:
-    """Return the problem with fixed variables."""
-    bounds = {f"{name}.{end}": value for name, value in variables.items() for end in ("lower", "upper")}
-    return replace(spec, values={**spec.values, **bounds})
-
-
-def list_sweep(reading: str, what: str, phase: str) -> list[ProblemSpec]:
-    """Return the problems of a sweep."""
+def list_sweep(reading: str, what: str, phase: str) -> dict[float, ProblemSpec]:
+    """Return the problems of a sweep by the value of the fixed variable."""
     variable, values = SWEEPS[what, phase]
-    return [fix(make_spec(phase, reading, f"-{what}-{value:g}"), **{variable: value}) for value in values]
+    specs = {value: make_spec(phase, reading, f"-{what}-{value:g}") for value in values}
+    return {
+        value: replace(spec, values={f"{variable}.{end}": value for end in ("lower", "upper")})
+        for value, spec in specs.items()
+    }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,18 +110,17 @@ class NaoResults:
     computed: Mapping[str, Any] = field(default_factory=dict)  # by name
     searches: Mapping[str, str] = field(default_factory=dict)  # labels of the runs of PSO and GA; empty without runs
 
-    def change(self, phase: str, search: str, changes: Mapping[str, float]) -> list[float]:
-        """Return a printed solution with other values of some variables."""
+    def _change(self, phase: str, search: str, changes: Mapping[str, float]) -> list[float]:
         names = make_spec(phase, self.reading).load().names
         return list({**dict(zip(names, PRINTED_X[phase, search], strict=True)), **changes}.values())
 
     def measure(self, phase: str, search: str = "PSO", /, **changes: float) -> Mapping[str, float]:
         """Return the figures of a printed solution, with other values of some variables."""
-        return evaluate_point(make_spec(phase, self.reading), self.change(phase, search, changes))
+        return evaluate_point(make_spec(phase, self.reading), self._change(phase, search, changes))
 
     def sample(self, phase: str, search: str = "PSO", /, **changes: float) -> Signals:
         """Return the signals of a printed solution, with other values of some variables."""
-        return make_spec(phase, self.reading).load().signals(self.change(phase, search, changes))
+        return make_spec(phase, self.reading).load().signals(self._change(phase, search, changes))
 
     def best(self, spec: ProblemSpec) -> RunRecord:
         """Return IPOPT's best run."""
@@ -132,14 +128,8 @@ class NaoResults:
 
     def sweep(self, what: str, phase: str) -> list[tuple[float, float]]:
         """Return values of the variable of a sweep and the least power there, where there is a gait."""
-        ends = [self.best(spec) for spec in list_sweep(self.reading, what, phase)]
-        pairs = zip(SWEEPS[what, phase][1], ends, strict=True)
-        return [(value, end.objective) for value, end in pairs if end.feasible]
-
-    def excess(self, phase: str) -> float | None:
-        """Return the power of PSO's printed solution above the optimum [%]; None without a feasible optimum."""
-        best = self.best(make_spec(phase, self.reading))
-        return 100 * (self.measure(phase)["power_W"] / best.objective - 1) if best.feasible else None
+        ends = {value: self.best(spec) for value, spec in list_sweep(self.reading, what, phase).items()}
+        return [(value, end.objective) for value, end in ends.items() if end.feasible]
 
     def list_runs(self, phase: str, search: str) -> list[RunRecord]:
         """Return the runs of a search."""
@@ -147,8 +137,7 @@ class NaoResults:
 
     def final_powers(self, phase: str, search: str) -> list[float]:
         """Return the power at the end of each run [W]; infinite without a feasible solution."""
-        ends = [run for run in self.list_runs(phase, search)]
-        return [end.objective if end.feasible else math.inf for end in ends]
+        return [run.objective if run.feasible else math.inf for run in self.list_runs(phase, search)]
 
 
 def _make_start_tasks(effort: NaoEffort) -> Iterator[Run]:
@@ -157,17 +146,16 @@ def _make_start_tasks(effort: NaoEffort) -> Iterator[Run]:
             yield from _start_from_print(make_spec(phase, reading), phase, effort.starts)
         for what, phase in SWEEPS:
             if what != "gap" or reading == RECONSTRUCTED:
-                for spec in list_sweep(reading, what, phase):
+                for spec in list_sweep(reading, what, phase).values():
                     yield from _start_from_print(spec, phase, min(effort.starts, 1))
 
 
-def _start_from_print(spec: ProblemSpec, phase: str, random: int) -> Iterator[Run]:
-    """Yield a run of IPOPT from PSO's printed solution, and others from random points."""
-    problem, settings = spec.load(), {"compiled": False}  # compiling takes longer than it saves
-    x = np.clip(PRINTED_X[phase, "PSO"], problem.lower, problem.upper)
-    yield Run(problem=spec, solver=IPOPT, settings=settings, start=problem.by_name(x))
-    for task in make_start_tasks(spec, random, settings=settings):
-        yield replace(task, number=task.number + 1)
+def _start_from_print(spec: ProblemSpec, phase: str, random: int) -> list[Run]:
+    problem = spec.load()
+    first = problem.by_name(np.clip(PRINTED_X[phase, "PSO"], problem.lower, problem.upper))
+    return make_start_tasks(
+        spec, random, first=[first], settings={"compiled": False}
+    )  # compiling takes longer than it saves
 
 
 def compute(runner: Runner, effort: NaoEffort) -> dict[str, NaoResults]:
@@ -201,10 +189,7 @@ def _make_computations(effort: NaoEffort) -> Iterator[tuple[str, Computation]]:
     """Yield simulations of the printed solutions, and clouds of all gaits that a search finds."""
     for phase in PHASES:
         spec = make_spec(phase, RECONSTRUCTED)
-        for search in SEARCHES:
-            x = PRINTED_X[phase, search]
+        for search, algorithm in SEARCHES.items():
+            x, cloud = PRINTED_X[phase, search], {"algorithm": algorithm, "evaluations": effort.evaluations}
             yield make_computation(f"simulation-{phase}-{search}", spec, partial(simulate_point, spec), x=x)
-        for search, algorithm in (("PSO", "pso"), ("GA", "ga")):
-            function = partial(collect_cloud, spec)
-            arguments = {"algorithm": algorithm, "evaluations": effort.evaluations}
-            yield make_computation(f"cloud-{phase}-{search}", spec, function, **arguments)
+            yield make_computation(f"cloud-{phase}-{search}", spec, partial(collect_cloud, spec), **cloud)

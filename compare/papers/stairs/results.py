@@ -16,10 +16,8 @@ from compare.papers.paper_runs import (
     Runner,
     Runs,
     choose_best,
-    get_point,
     make_computation,
     make_search_tasks,
-    make_start_tasks,
     simulate_point,
 )
 from compare.papers.stairs import printed
@@ -60,7 +58,6 @@ class StairsEffort(Effort):
 
     runs: int = 11  # of the colony on each reading of the tracked step, at most as many as readings.csv says
     evaluations: int = ANTS * ITERATIONS  # of a run, as in the paper
-    starts: int = 1  # of IPOPT on each plan, the first one near our best known plan
     poses: int = 350  # of the network, every 0.01 s
 
 
@@ -87,10 +84,13 @@ class StairsResults:
         return {case: printed.move(make_plan_spec(self.plan, case), self.best(case).x) for case in TABLE_4}
 
     @cached_property
-    def peaks(self) -> list[tuple[float, float]]:
-        """Largest acceleration [rad/s^2] and jerk [rad/s^3] by case."""
+    def _peaks(self) -> list[tuple[float, float]]:
         plans = [(case, self.best(case).x) for case in TABLE_4]
         return [printed.measure_peaks(make_track_spec(case, x), x["torso_pitch_rad"]) for case, x in plans]
+
+    def list_peaks(self, column: int) -> list[float]:
+        """Return the largest accelerations [rad/s^2] (0) or jerks [rad/s^3] (1) of the plans by case."""
+        return [peak[column] for peak in self._peaks]
 
     def list_computed(self, what: str, key: str | None = None) -> list[Any]:
         """Return a number of a computation on the plans of all cases, or on the tracked steps."""
@@ -118,13 +118,11 @@ def make_plan_spec(plan: str, case: int, label: str = "", **options: Any) -> Pro
     return ProblemSpec(name="stairs-plan", options=options, values=TABLE_4[case].stair, label=label or f"{plan}-{case}")
 
 
-def make_track_spec(case: int, plan: Mapping[str, float], tracking: str = "", **options: Any) -> ProblemSpec:
+def make_track_spec(case: int, plan: Mapping[str, float], tracking: str = "") -> ProblemSpec:
     """Return the tracking of a plan, given by the planner's variables."""
-    chosen, parameters = parse_settings(TRACKINGS[tracking or LITERAL]["option"])
+    options, parameters = parse_settings(TRACKINGS[tracking or LITERAL]["option"])
     values = {**TABLE_4[case].stair, **{name: plan[name] for name in PLAN}, **parameters}
-    return ProblemSpec(
-        name="stairs-track", options={**chosen, **options}, values=values, label=make_title(tracking, case)
-    )
+    return ProblemSpec(name="stairs-track", options=options, values=values, label=make_title(tracking, case))
 
 
 def make_title(tracking: str, case: int | str = "all") -> str:
@@ -134,13 +132,10 @@ def make_title(tracking: str, case: int | str = "all") -> str:
 
 def compute(runner: Runner, effort: StairsEffort) -> dict[str, StairsResults]:
     """Plan all steps; then undo choices of the planner, simulate the plans, and track them."""
-    runs = runner.run_tasks(_make_plan_tasks(effort))
+    runs = runner.run_tasks(_make_plan_tasks())
     plans = {plan: StairsResults(plan=plan, runs=runs, computed={}) for plan in PLANS.values()}
-    tasks = [
-        *_make_track_tasks(effort, plans),
-        *(_make_choice_tasks(plans["jerk"].best(DRAWN_CASE)) if effort.runs else ()),
-    ]
-    runs |= runner.run_tasks(tasks)
+    choices = _make_choice_tasks(plans["jerk"].best(DRAWN_CASE)) if effort.runs else ()
+    runs |= runner.run_tasks([*_make_track_tasks(effort, plans), *choices])
     computed = runner.compute([*_make_computations(effort, plans)])
     results = {reading: StairsResults(plan=plan, runs=runs, computed=computed) for reading, plan in PLANS.items()}
     if effort.runs:
@@ -151,27 +146,22 @@ def compute(runner: Runner, effort: StairsEffort) -> dict[str, StairsResults]:
     return results
 
 
-def _make_plan_tasks(effort: StairsEffort) -> Iterator[Run]:
+def _make_plan_tasks() -> Iterator[Run]:
     for row in read_rows(FOLDER / "starts.csv"):
         spec = make_plan_spec(row.pop("plan"), int(row.pop("case")))
-        start = {name: float(value) for name, value in row.items()}
-        yield Run(problem=spec, solver=IPOPT, settings=NEAR_OPTIMUM, start=start)
-        for task in make_start_tasks(spec, effort.starts - 1):
-            yield replace(task, number=task.number + 1)
+        near = {name: float(value) for name, value in row.items()}
+        yield Run(problem=spec, solver=IPOPT, settings=NEAR_OPTIMUM, start=near)
 
 
 def _make_choice_tasks(best: RunRecord) -> Iterator[Run]:
     """Yield plans of least jerk of case 2 under each choice, from ours."""
     for name, (options, values) in CHOICES.items():
         spec = make_plan_spec("jerk", DRAWN_CASE, label=f"jerk-{name}", **options)
-        yield _start_near(replace(spec, values={**spec.values, **values}), best)
-
-
-def _start_near(spec: ProblemSpec, best: RunRecord) -> Run:
-    problem = spec.load()
-    ends = zip(problem.names, problem.lower, problem.upper, strict=True)
-    start = {name: float(np.clip(best.x[name], lower, upper)) for name, lower, upper in ends}
-    return Run(problem=spec, solver=IPOPT, start=start)
+        spec = replace(spec, values={**spec.values, **values})
+        problem = spec.load()
+        near = [best.x[name] for name in problem.names]
+        start = problem.by_name(np.clip(near, problem.lower, problem.upper))
+        yield Run(problem=spec, solver=IPOPT, start=start)
 
 
 def _make_track_tasks(effort: StairsEffort, plans: Mapping[str, StairsResults]) -> Iterator[Run]:
@@ -199,7 +189,7 @@ def _make_power_computations(
     for name in TRACKINGS:
         for case, run in zip(TABLE_4, results[name].tracked, strict=True):
             spec = make_track_spec(case, results[name].best(case).x, name)
-            settings = {"x": get_point(run), "evaluations": effort.evaluations}
+            settings = {"x": [*run.x.values()], "evaluations": effort.evaluations}
             yield make_computation(f"power-{name}-{case}", spec, partial(tune_otherwise, spec), **settings)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +33,7 @@ OPTIONS = {name: parse_settings(row["option"])[0] for name, row in READINGS.item
 LITERAL, RAISED, SECOND = "as printed", "ankle raised", "one second"
 GA, GA_EVALUATIONS = GoswamiGeneticAlgorithm(), 930  # Table II: 30 epochs after the first population
 F1MAX, F2MAX = 442.522, 0.13  # [1/(m^2 s)], [m]
+NAMES = ("s", "n", "H", "h")  # of the variables in their order
 UNBENT_WEIGHTS = (0.15, 0.9, 1.0)
 
 
@@ -104,9 +106,9 @@ class Results:
         return OPTIONS[self.reading]
 
     @property
-    def zmp(self) -> str:
-        """The reading of the ZMP."""
-        return self.options.get("zmp", "exact")
+    def searched(self) -> bool:
+        """Whether there are runs of the GA."""
+        return any(solver == "ga" for _, solver in self.runs)
 
     def find_runs(self, what: str, solver: str = IPOPT) -> list[RunRecord]:
         """Return the runs of a solver: at T = 1 s both horizons are the same."""
@@ -116,6 +118,14 @@ class Results:
     def best(self, what: str) -> RunRecord:
         """Return IPOPT's best start."""
         return choose_best(self.find_runs(what))
+
+    def list_ends(self, what: str, scale: float = 1.0) -> list[float]:
+        """Return f at the ends of the GA's runs on a problem, times a scale; minus infinity without a feasible gait."""
+        return [scale * run.objective if run.feasible else -math.inf for run in self.find_runs(what, "ga")]
+
+    def list_f(self, rows: Sequence[PaperRow]) -> list[float]:
+        """Return f of printed gaits under the printed f1max."""
+        return [compute_f(row, row.f1max, **self.options) for row in rows]
 
     @property
     def optima(self) -> list[RunRecord]:

@@ -12,7 +12,7 @@ import pytest
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.papers.paper_runs import Runner
 from compare.papers.rules import Ruling
-from compare.papers.walk12.walk12 import RAISED, READINGS, SECOND, TABLE_3
+from compare.papers.walk12.results import RAISED, READINGS, SECOND, TABLE_3
 from compare.study.record import read_record
 from docs.pages.papers import RECORDS, paper_page
 from nlp_gait.errors import OutputError
@@ -40,10 +40,10 @@ def test_a_quick_run_confirms_the_record(name: str, quick: Quick) -> None:
     paper = load_reproduction(name)
     recorded = json.loads((RECORDS / f"{name}.json").read_text(encoding="utf-8"))["verdicts"]
     folder, fresh = quick(name)
-    assert fresh["verdicts"].keys() == recorded.keys() == paper.book.claims.keys()
+    assert fresh["verdicts"].keys() == recorded.keys() == paper.claims.keys()
     for id, row in fresh["verdicts"].items():
-        words = {*row.values()} if id in paper.book.on_runs else row
-        assert words == ({Ruling.NOT_RUN} if id in paper.book.on_runs else recorded[id]), id
+        words = {*row.values()} if id in paper.numbers_of_runs else row
+        assert words == ({Ruling.NOT_RUN} if id in paper.numbers_of_runs else recorded[id]), id
     report = (folder / "report.md").read_text(encoding="utf-8")
     order = (
         paper.title,

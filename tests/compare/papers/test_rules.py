@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from compare.papers import load_reproduction
-from compare.papers.paper import Book, parse_settings
+from compare.papers.paper import Paper, parse_settings
+from compare.papers.paper_runs import Effort
 from compare.papers.rules import Alternatives, ClaimRow, Found, Judgement, Ruling, decide, describe, judge
 
 
@@ -89,16 +90,16 @@ def test_excluded_readings_decide_nothing_and_others_only_if_they_vary_a_choice(
     assert paper.combine({**row, varied: fails}, {}).here.startswith("on the ankle's height: as printed: holds (1)")
 
 
-def test_an_id_on_one_side_only_is_refused() -> None:
-    book = Book("made-up", Path(), {"one": make_claim("falls")}, {})
-    with pytest.raises(KeyError, match="one"):
-        book.check()
-    with pytest.raises(KeyError, match="two"):
-        book.bind({"two": lambda found: 1.0})
-    book.bind({"one": lambda found: [2.0, 1.0]})
-    book.check()
-    with pytest.raises(KeyError, match="twice"):
-        book.bind({"one": lambda found: 1.0})
+@pytest.mark.parametrize("numbers", [{}, {"one": float, "two": float}])
+def test_an_id_on_one_side_only_is_refused(numbers: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "made_up.csv").write_text("id,where,claim,printed,unit,rule,note\none,1,it is so,,,falls,\n")
+    known: dict[str, Any] = {"module": str(tmp_path / "made_up.py"), "title": "", "full": Effort(), "quick": Effort()}
+    known |= {"readings": {}, "compute": lambda runner, effort: {}, "headlines": ()}
+    Paper(**known, numbers={"one": float})
+    with pytest.raises(ValueError, match="one row and one function each: (one|two)"):
+        Paper(**known, numbers=numbers)
+    with pytest.raises(ValueError, match="one row and one function each: one"):
+        Paper(**known, numbers={"one": float}, numbers_of_runs={"one": float})
 
 
 def test_an_option_of_a_difference_is_read_as_on_the_command_line() -> None:

@@ -2,16 +2,9 @@
 
 import pytest
 
-from compare.papers.walk12.walk12 import (
-    LITERAL,
-    RAISED,
-    TABLE_4,
-    Results,
-    count_met,
-    find_branch,
-    list_ends,
-    list_rod_changes,
-)
+from compare.papers.walk12.page import count_met
+from compare.papers.walk12.results import LITERAL, RAISED, TABLE_4, Results
+from compare.papers.walk12.walk12 import find_branch, list_rod_changes
 from tests.compare.records import record
 
 
@@ -31,4 +24,4 @@ def test_moments_of_rods_are_small_and_2_misses_deeply_bent_legs_only() -> None:
 
 def test_an_infeasible_run_has_no_rank() -> None:
     run = record("ga", 0, [(10, 0.9)])
-    assert list_ends(Results(LITERAL, {("as-printed-0.2", "ga"): [run]}), ["0.2"], 2.0) == [[1.8]]
+    assert Results(LITERAL, {("as-printed-0.2", "ga"): [run]}).list_ends("0.2", 2.0) == [1.8]
