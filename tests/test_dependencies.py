@@ -46,10 +46,9 @@ LAYERS = (
     "compare.papers",
     "compare.cli",
 )
-# Imports of a later layer within a method: what a solution shows is made by the packages that draw and differentiate.
+# Imports of a later layer within a method: what a solution shows is made by the packages that draw.
 SHOWN = {
     "nlp_gait.formulation.solution": (
-        "nlp_gait.backends.optima.sensitivities.tabulate_sensitivities",
         "compare.drawing.gait_figure.plot_gait",
         "compare.report.interactive.animate_gait",
     )

@@ -21,10 +21,7 @@ Expression: TypeAlias = MX | SX
 SHARE = 0.1
 SAMPLES = 5  # points within the bounds
 UNNAMED = "problem"  # until it is loaded as FILE.py:NAME
-BOUNDS = ("lbx", "ubx", "lbg", "ubg", "discrete")
-INTEGER = (
-    "{} is an integer variable; problems here are continuous: relax it, or use a mixed-integer solver such as Bonmin"
-)
+BOUNDS = ("lbx", "ubx", "lbg", "ubg")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,7 +58,7 @@ def problem(
         unit: of the objective.
         sense: ``"minimise"`` or ``"maximise"``.
         tolerance: by which an equation may be missed; searches need about 1e-4.
-        bounds: of the dictionary: ``lbx``, ``ubx``, ``lbg``, ``ubg``; and ``discrete``, which must be false.
+        bounds: of the dictionary: ``lbx``, ``ubx``, ``lbg``, ``ubg``.
 
     Raises InputError that says what is missing or not allowed, also for integer variables.
     """
@@ -235,11 +232,6 @@ def _read_dictionary(nlp: Mapping[str, Any], p: Any, bounds: Mapping[str, Any]) 
     n, m = nlp["x"].numel(), g.numel()
     ends = {name: _to_column(name, bounds.get(name, sign * math.inf), size)
             for name, sign, size in (("lbx", -1, n), ("ubx", 1, n), ("lbg", -1, m), ("ubg", 1, m))}  # fmt: skip
-    names = [name for symbol in symbols for name in _name_entries(symbol)]
-    discrete = _to_column("discrete", np.array(bounds.get("discrete", 0), dtype=float), n)
-    for name, is_integer in zip(names, discrete, strict=True):
-        if is_integer:
-            raise InputError(INTEGER.format(name))
     entries = [name for symbol in ca.symvar(given) for name in _name_entries(symbol)]
     values = [p[name] for name in entries] if isinstance(p, Mapping) and set(p) == set(entries) else p
     rows = {"g": (ca.vec(g), kind(ends["lbg"]), kind(ends["ubg"]))} if m else {}
@@ -259,7 +251,8 @@ def _read_opti(opti: ca.Opti) -> _Parts:
         raise InputError("the Opti stack has no objective; call minimize first")
     for symbol in symbols:
         if opti.advanced.get_meta(symbol).domain != ca.OPTI_DOMAIN_REAL:
-            raise InputError(INTEGER.format(symbol.name()))
+            remedy = "relax it, or use a mixed-integer solver such as Bonmin"
+            raise InputError(f"{symbol.name()} is an integer variable; problems here are continuous: {remedy}")
     values = [v for symbol in parameters for v in np.array(opti.debug.value(symbol)).ravel()]
     chosen, low, high, *_ = ca.detect_simple_bounds(opti.x, opti.p, opti.g, opti.lbg, opti.ubg)
     ends = ca.Function("ends", [opti.p], [low, high])(ca.DM(values))

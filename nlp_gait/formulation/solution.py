@@ -199,16 +199,6 @@ class Solution:
 
         return animate_gait(self.problem, self.x, self.best.solver)
 
-    def sensitivity(self) -> Any:
-        """Return a table of the derivatives of x and the objective with respect to all parameters.
-
-        It has ``value(quantity, parameter)`` in the quantity's unit per unit of the parameter, ``write_csv(path)``, and
-        ``reach``, how far each parameter may change. Raises InputError without multipliers, or if x is not an isolated optimum.
-        """
-        from nlp_gait.backends.optima.sensitivities import tabulate_sensitivities
-
-        return tabulate_sensitivities(self)
-
     def to_json(self) -> dict[str, Any]:
         """Return plain dictionaries, lists and numbers, with the schema version of results."""
         problem, best = self.problem, self.best

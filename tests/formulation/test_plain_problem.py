@@ -117,7 +117,6 @@ BOX = {"x": (0, 1), "y": (0, 1)}
         ((X + Y, [SX(1) <= X / X * 0 + SX.sym("c")]), {"x": BOX, "p": {"c": 1}}, "constraint g1 contains no variable"),
         (({"x": X},), {}, "needs at least x and f"),
         (({"x": X, "f": X},), {"lbx": [0, 1], "ubx": 1}, "lbx must be one number or 1, got 2"),
-        (({"x": X, "f": X},), {"lbx": 0, "ubx": 1, "discrete": [True]}, "x is an integer variable; problems here are"),
         ((opti_with_an_integer(),), {}, "is an integer variable; problems here are continuous: relax it"),
     ],
 )

@@ -1,8 +1,8 @@
 """The plan of an NLP's values and derivatives, from its structure: the chain rule over samples and glue.
 
 First derivatives go forward: D = du/dw from the glue, dv/dw = (dv/du) D sample by sample. Second ones go backward: with the
-outputs' weights of each sample, H = sum D' (d2v/du2) D, and what the glue adds. Where a sample depends on no more variables
-than it has inputs, directions are the columns of D; else they are its inputs, and D is multiplied in afterwards.
+outputs' weights of each sample, H = sum D' (d2v/du2) D, and what the glue adds. Long functions of a sample are evaluated for
+each column of D, short ones write out their derivatives, with which D is multiplied.
 """
 
 from collections.abc import Sequence
@@ -13,9 +13,8 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.backends.derivatives.first_order import Assembler, Glue, StagePlaces, unite
 from nlp_gait.backends.derivatives.plan import FIRST, ONE, SECOND, Call, DerivativePlan, Integers, PlaceBlock, Row
-from nlp_gait.backends.derivatives.structure import Structure, stack_nonzeros
+from nlp_gait.backends.derivatives.structure import Assembler, Glue, StagePlaces, Structure, stack_nonzeros, unite
 
 # Columns d and c, the entries for c, and places of the entry for d and of a factor.
 Products: TypeAlias = "list[tuple[Integers, Integers, Row, int, int]]"
@@ -83,8 +82,8 @@ class Hessian:
         if sample.directional:
             place = plan.allocate(count * ma * samples.width)
             change = PlaceBlock(place, ma * samples.width, ma, samples.width, 1)
-            given = (samples.read, weights, samples.place_directions(plan))
-            plan.add_call(SECOND, Call(number, count, samples.count_directions(), given, (write, change)))
+            given = (samples.read, weights, samples.directions)
+            plan.add_call(SECOND, Call(number, count, samples.direction_counts, given, (write, change)))
         else:
             upper = ca.triu(sample.hessian)
             place = plan.allocate(count * upper.nnz())
@@ -96,15 +95,15 @@ class Hessian:
         for e in range(count):
             for a in range(ma):
                 row = samples.rows[e][a]
-                if samples.by_column:
+                if sample.directional:
                     changed = [samples.rows[e][b].columns for b in np.flatnonzero(pattern[a])]
                     columns = unite(changed)
                     places = place + (e * ma + a) * samples.width + np.searchsorted(samples.columns[e], columns)
                     _add_outer(row, Row(columns, places), ONE, contributions)
                     continue
                 for b in np.flatnonzero(pattern[a]):
-                    factor = place + ((e * ma + a) * ma + b if sample.directional else e * upper.nnz() + entry[a, b])
-                    _add_outer(row, samples.rows[e][b], int(factor), contributions)
+                    factor = int(place + e * upper.nnz() + entry[a, b])
+                    _add_outer(row, samples.rows[e][b], factor, contributions)
         places = np.full(len(samples.glue.entries), -1)
         for a, i in enumerate(samples.active):
             places[i + samples.m * np.arange(count)] = gradient + a + ma * np.arange(count)
@@ -141,7 +140,7 @@ class NlpPlan:
 
 
 def make_nlp_plan(structure: Structure, *, second: bool = True) -> NlpPlan:
-    """Return the plan of an NLP, with second derivatives or without; raises NotMapped for an operation without C++."""
+    """Return the plan of an NLP, with second derivatives or without; raises CompilerError for an operation without C++."""
     assembler = Assembler(structure)
     plan, n = assembler.plan, assembler.n
     stages = []

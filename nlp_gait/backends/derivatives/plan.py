@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.backends.derivatives.structure import NotMapped
+from nlp_gait.errors import CompilerError
 from nlp_gait.symbolic.tape import Instruction, read_tape
 
 _UNARY = "EXP LOG SQRT SIN COS TAN ASIN ACOS ATAN SINH COSH TANH FLOOR CEIL FABS SIGN NOT LOG1P EXPM1"
@@ -42,10 +42,10 @@ PIECE = 500
 
 
 def read_operations(function: ca.Function) -> Iterator[Instruction]:
-    """Yield the instructions of a function of scalar operations; raises NotMapped for one that has no C++ here."""
+    """Yield the instructions of a function of scalar operations; raises CompilerError for one that has no C++ here."""
     for instruction in read_tape(function):
         if instruction.operation not in (*EXPRESSIONS, ca.OP_INPUT, ca.OP_CONST, ca.OP_OUTPUT):
-            raise NotMapped(f"operation {instruction.operation} of function {function.name()}")
+            raise CompilerError(f"operation {instruction.operation} of function {function.name()}")
         yield instruction
 
 

@@ -7,17 +7,14 @@ Stability Analysis in Nonlinear Programming, theorem 3.2.2).
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from nlp_gait.backends.optima.optimum import WEAK, Optimum, build_kkt_functions, find_optimum, solve_kkt, to_array
-from nlp_gait.errors import InputError, unknown
-from nlp_gait.files import format_csv, write_text
+from nlp_gait.backends.optima.optimum import WEAK, Optimum, build_kkt_functions, solve_kkt, to_array
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
-from nlp_gait.formulation.solution import Solution
 
 # Dependent active rows may contradict each other by this share of a row's change.
 CONTRADICTION = 1e-6
@@ -34,35 +31,6 @@ class Sensitivities:
     defined: Array  #: (k,) False where dependent active bounds contradict each other: no derivative exists
     #: (2, k) change of the quantity, down (<= 0) and up, at which, to first order, the next bound becomes active or is released
     reach: Array
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SensitivityTable:
-    """Derivatives of a solution with respect to all parameters, with names and units; NaN where there is no derivative."""
-
-    quantities: tuple[tuple[str, str], ...]  #: (n + 1) name and unit of the objective, then of each variable
-    parameters: tuple[tuple[str, str], ...]  #: (k) name and unit of each parameter
-    values: Array  #: (n + 1, k) change of each quantity per unit of each parameter
-    reach: Array  #: (2, k) change of each parameter, down and up, up to which the derivatives are those of the same active bounds
-
-    def value(self, quantity: str, parameter: str) -> float:
-        """Return the change of a variable, or of the objective, per unit of a parameter; raises UnknownNameError."""
-        names, parameters = ([name for name, _ in pairs] for pairs in (self.quantities, self.parameters))
-        if quantity not in names:
-            raise unknown("quantity", quantity, names)
-        if parameter not in parameters:
-            raise unknown("parameter", parameter, parameters)
-        return float(self.values[names.index(quantity), parameters.index(parameter)])
-
-    def write_csv(self, path: Path) -> None:
-        """Write one row for each parameter; the unit is part of a column's name. Raises OutputError."""
-        header = ["parameter", "parameter_unit", "reach_down", "reach_up"]
-        header += [f"{name} [{unit}]" for name, unit in self.quantities]
-        rows = [
-            [name, unit, *self.reach[:, k].tolist(), *self.values[:, k].tolist()]
-            for k, (name, unit) in enumerate(self.parameters)
-        ]
-        write_text(path, format_csv([header, *rows]))
 
 
 class _Change(NamedTuple):
@@ -82,18 +50,6 @@ def differentiate_by_parameters(optimum: Optimum) -> Sensitivities:
     jacobians = optimum.functions.by_parameters(optimum.w, optimum.parameters, optimum.multipliers)
     cost, *changes = (np.array(jacobian)[:, :-1] for jacobian in jacobians)  # the last one is the sigmoid's width
     return _differentiate(optimum, _Change(cost[0], *changes))
-
-
-def tabulate_sensitivities(solution: Solution) -> SensitivityTable:
-    """Return the derivatives of a solution's best start; InputError if it has no multipliers or there are no derivatives."""
-    problem = solution.problem
-    derivatives = differentiate_by_parameters(find_optimum(problem, solution.best))
-    values = np.vstack([derivatives.objective, derivatives.x])
-    values[:, np.logical_not(derivatives.defined)] = np.nan
-    goal = problem.objective
-    quantities = ((goal.name, goal.unit), *((variable.name, variable.unit) for variable in problem.variables))
-    parameters = tuple((parameter.name, parameter.unit) for parameter in problem.parameters)
-    return SensitivityTable(quantities=quantities, parameters=parameters, values=values, reach=derivatives.reach)
 
 
 @lock_casadi

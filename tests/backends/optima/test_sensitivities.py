@@ -1,17 +1,16 @@
 """Derivatives of optima: by hand, by solving again, and by CasADi's own."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait import load, solve
+from nlp_gait import load
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import differentiate_by_models, differentiate_by_parameters
 from nlp_gait.backends.solve import Continuation, find_cheapest_feasible
-from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint, GaitProblem, Variable
 from nlp_gait.formulation.solution import Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -136,20 +135,6 @@ def test_a_model_with_other_rows_is_refused() -> None:
     other = load("walk12", intervals=10)
     with pytest.raises(InputError, match="other constraints"):
         differentiate_by_models(at, [(other, other, 1.0)])
-
-
-def test_a_solution_lists_its_derivatives_with_units(tmp_path: Path) -> None:
-    """3 (limit - 1) at (limit, limit)."""
-    problem = toy(corner, limit=1.5)
-    table = solve(problem, starts=3).sensitivity()
-    assert table.value("cost", "limit") == pytest.approx(3.0, abs=1e-8)
-    assert table.value("x", "limit") == pytest.approx(1.0, abs=1e-8)
-    with pytest.raises(UnknownNameError, match="quantity 'z'"):
-        table.value("z", "limit")
-    table.write_csv(tmp_path / "table.csv")
-    header, first, *others = (tmp_path / "table.csv").read_text().splitlines()
-    assert header == "parameter,parameter_unit,reach_down,reach_up,cost [J],x [m],y [m]" and len(others) == 4
-    assert first.startswith("limit,m,") and float(first.split(",")[4]) == table.value("cost", "limit")
 
 
 def test_a_price_reaches_zero_where_its_limit_ends_to_bind() -> None:
