@@ -37,10 +37,10 @@ def write_headline(comparison: Comparison) -> str:
     reaching = [solver for solver, gap in gaps if 0.0 <= gap <= FOUND]
     clauses = [_describe_failing(solver) for solver, gap in gaps if gap == math.inf]
     if reaching:
-        first, *others = reaching
-        best = "it" if away else _name_reference(comparison)
-        texts = [f"{first.title} reaches {best} {_count_reaching(comparison, first)}"]
-        clauses.insert(0, ", ".join([*texts, *(f"{s.title} {_count_reaching(comparison, s)}" for s in others)]))
+        runs = join_words(_count_reaching(comparison, solver) for solver in reaching)
+        verb = "reach" if max(len(reaching), len(reaching[0].records)) > 1 else "reaches"
+        runs = runs if away else runs[:1].upper() + runs[1:]
+        clauses.insert(0, f"{runs} {verb} {'it' if away else _name_reference(comparison)}")
     if away:
         clauses.insert(0, _describe_away(comparison, away))
     more = len(comparison.solvers) - len(gaps)
@@ -73,10 +73,10 @@ def _name_reference(comparison: Comparison) -> str:
     if known.objective is None:
         return f"the best value found ({value})"
     if known.bound is None:
-        return f"the best known value of {value}"
+        return f"the best known value {value}"
     if abs(known.bound - comparison.reference) <= SIX_DIGITS * (abs(comparison.reference) or 1.0):
-        return f"the proven optimum of {value}"
-    return f"the best known value of {value} (proven within {describe_gap(known.bound, comparison.reference)})"
+        return f"the proven optimum {value}"
+    return f"the best known value {value} (proven within {describe_gap(known.bound, comparison.reference)})"
 
 
 def _format_distance(comparison: Comparison, gap: float) -> str:
@@ -90,9 +90,9 @@ def _describe_away(comparison: Comparison, away: Sequence[tuple[SolverRuns, floa
     (first, gap), *others = away
     which = "median" if len(first.records) > 1 else "only"
     distance = f"{_format_distance(comparison, gap)} {_name_reference(comparison)}"
-    words = [f"The {which} {first.title} run ends {distance}"]
+    words = [f"{first.title}'s {which} run ends {distance}"]
     doubts = _list_doubts(comparison, [solver for solver, _ in away])
-    words += [f"{solver.title} {comparison.format_gap(abs(gap))}" for solver, gap in others]
+    words += [f"{solver.title}'s {comparison.format_gap(abs(gap))}" for solver, gap in others]
     marks = [" (order uncertain)" if a and not b else "" for a, b in itertools.pairwise([False, *doubts, False])]
     return ", ".join(f"{word}{mark}" for word, mark in zip(words, marks, strict=True))
 
@@ -104,13 +104,13 @@ def _list_doubts(comparison: Comparison, solvers: Sequence[SolverRuns]) -> list[
 
 
 def _count_reaching(comparison: Comparison, solver: SolverRuns) -> str:
-    """Return for example ``from all 20 starts``."""
+    """Return for example ``all 20 IPOPT starts``."""
     reached, runs = comparison.count_reached(solver), len(solver.records)
-    place, noun = ("from", "start") if solver.is_gradient else ("in", "run")
+    noun = "start" if solver.is_gradient else "run"
     if runs == 1:
-        return f"in its only {noun}"
+        return f"the only {solver.title} {noun}"
     count = f"{reached} of {runs}" if reached < runs else "both" if runs == 2 else f"all {runs}"
-    return f"{place} {count} {noun}s"
+    return f"{count} {solver.title} {noun}s"
 
 
 def _describe_failing(solver: SolverRuns) -> str:

@@ -12,7 +12,7 @@ from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import LiveGaps, describe_failures, describe_unknown, write_headlines
 from compare.cli import options
 from compare.cli.command import CONTINUE, OUTPUT, command
-from compare.cli.printing import Output, Rows, describe_command, say, say_error, show_progress, stderr
+from compare.cli.printing import Output, Rows, describe_command, say_error, show_progress
 from compare.report import write_report
 from compare.study.import_runs import read_imported_records
 from compare.study.record import RunRecord
@@ -89,8 +89,6 @@ def compare(
         stop=Stop(evaluations=searches.evaluations, time_limit_s=searches.time_limit),
         seed=searches.seed,
     )
-    if stderr.is_terminal:
-        say(f"watch it: nlp-gait report {out} --watch")
     records = run_in_folder(runs, out, jobs, scheduler)
     records += read_imported_records(out, records)
     written = write_report(out, records, read_study_file(out))

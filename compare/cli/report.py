@@ -10,7 +10,7 @@ from compare.cli.options import Code, Scheduler, name_all
 from compare.cli.printing import Output, describe_command, say, show_progress
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.papers.paper_runs import Runner
-from compare.report import FurtherFiles, renew_report, watch_report
+from compare.report import FurtherFiles, renew_report
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
 
@@ -23,21 +23,15 @@ def report(
     figures: Annotated[bool, Option("--figures")] = False,
     code: Code = None,
     csv: Annotated[bool, Option("--csv")] = False,
-    watch: Annotated[bool, Option("--watch")] = False,
 ) -> Output:
     """Rewrite a study's report from all records of its folder, without running a solver.
 
     It has the runs that `study.json` lists: of each problem and solver those of the latest command that ran it. Damaged records
     are left out and named; then the exit status is 1. `nlp-gait verify` computes a study again.
 
-    With `--watch` the report follows a running study until Ctrl-C.
-
     Examples: `nlp-gait report results`, `nlp-gait report results --latex --figures`
     """
     name_all(code)
-    if watch:
-        say(f"open {folder / 'report.html'}; it follows the study in {folder} until Ctrl-C")
-        watch_report(folder, lambda: renew_report(folder))
     further = FurtherFiles(csv=csv, latex=latex, figures=figures)
     _, damaged, written = renew_report(folder, further)
     return Output(data={"damaged": damaged}, written=written, failures=damaged)

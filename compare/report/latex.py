@@ -40,7 +40,8 @@ def format_latex_table(comparison: Comparison) -> str:
             cells[1] = rf"\textbf{{{cells[1]}}}"
         p = p_values.get(solver.name)
         shown_p = UNKNOWN if p is None else "$<$0.001" if p < 0.001 else f"{p:.3f}"
-        gap = _format_gap(comparison, comparison.gap(solver.median_cost))
+        distance = comparison.gap(solver.median_cost)
+        gap = escape_latex(comparison.format_gap(distance)) if math.isfinite(distance) else "infeasible"
         rows.append((escape_latex(solver.title), f"{len(values)}/{len(solver.records)}", *cells, gap, shown_p))
     return _format_table(_write_caption(comparison, is_best), make_file_name(comparison.problem), HEADER, rows)
 
@@ -100,11 +101,6 @@ def _write_caption(comparison: Comparison, is_best: bool) -> str:
         *([f"Bold: significantly better than all others at {SIGNIFICANT:g}"] if is_best else []),
     ]
     return ". ".join(map(escape_latex, sentences)) + "."
-
-
-def _format_gap(comparison: Comparison, gap: float) -> str:
-    """Return a gap as the report shows it."""
-    return escape_latex(comparison.format_gap(gap)) if math.isfinite(gap) else "infeasible"
 
 
 def _format_number(value: float | None, decimals: int) -> str:

@@ -1,7 +1,6 @@
 """Report of a study from its records, and the better points in it."""
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from compare.analysis.comparison import Comparison, compare_problems
@@ -13,12 +12,12 @@ from compare.report.document import Document
 from compare.report.study_files import FurtherFiles
 from compare.report.study_sections import (
     TESTS,
-    list_convergence,
     list_costs,
     list_optimum,
     list_tests,
     load_gaits,
     load_problem_or_none,
+    make_figure,
     make_folded_section,
     make_overview,
     make_problem_section,
@@ -27,13 +26,11 @@ from compare.report.study_sections import (
 )
 from compare.report.writing import write_document
 from compare.study.record import RunRecord, load_gait
-from compare.study.study import RECORDS, StudyFile, name_group, read_records, read_study_file
+from compare.study.study import StudyFile, name_group, read_records, read_study_file
 from nlp_gait.errors import InputError
-from nlp_gait.files import make_file_name, replace_nan, write_json, write_text
+from nlp_gait.files import make_file_name, replace_nan, write_json
 
 REPORT_ALONE = FurtherFiles()
-RELOAD = '<head>\n<meta http-equiv="refresh" content="5">'  # seconds between reloads of the page
-POLL_S = 2.0
 
 
 def write_report(
@@ -62,40 +59,24 @@ def renew_report(folder: Path, further: FurtherFiles = REPORT_ALONE) -> tuple[li
     return records, damaged, write_report(folder, records, read_study_file(folder), further=further)
 
 
-def watch_report(folder: Path, rewrite: Callable[[], object], sleep: Callable[[float], None] = time.sleep) -> None:
-    """Rewrite the report of a folder after every change of its records until Ctrl-C; the open page reloads itself."""
-    page, shown = folder / "report.html", None
-    try:
-        while True:
-            records = {path: path.stat().st_mtime_ns for path in (folder / RECORDS).glob("*/*.json")}
-            if records and records != shown:
-                rewrite()
-                write_text(page, page.read_text(encoding="utf-8").replace("<head>", RELOAD, 1))
-                shown = records
-            sleep(POLL_S)
-    except KeyboardInterrupt:
-        return
-
-
-def make_study_document(
-    comparisons: Sequence[Comparison],
-    file: StudyFile,
-) -> Document:
+def make_study_document(comparisons: Sequence[Comparison], file: StudyFile) -> Document:
     """Return the document of a study."""
     gaits = {comparison.problem: load_gaits(comparison) for comparison in comparisons}
     problems = {comparison.problem: load_problem_or_none(comparison) for comparison in comparisons}
+    records = [record for comparison in comparisons for record in comparison.records]
+    versions = dict.fromkeys(record.versions.get("nlp-gait", "unknown") for record in records)
     titles = {comparison.problem: split_title(comparison, problems[comparison.problem]) for comparison in comparisons}
     return Document(
         title=_write_title(list(titles.values()), len({solver.name for c in comparisons for solver in c.solvers})),
         parts=(
-            *_describe_command(file, [r for c in comparisons for r in c.records]),
-            *_describe_progress(file, [r for c in comparisons for r in c.records]),
+            *([f"{file.date[:10]}, v{', v'.join(versions)}: {file.command}"] if file.command else ()),
+            *_describe_progress(file, records),
             *((write_overall_headline(comparisons), make_overview(comparisons)) if len(comparisons) >= MANY else ()),
             *(
                 make_problem_section(c, titles[c.problem][0], problems[c.problem], gaits[c.problem])
                 for c in comparisons
             ),
-            make_folded_section("Convergence", comparisons, list_convergence),
+            make_folded_section("Convergence", comparisons, lambda c: (make_figure(c, "convergence"),)),
             make_folded_section("Cost to targets", comparisons, list_costs),
             make_folded_section("Significance", comparisons, list_tests, TESTS),
             make_folded_section(
@@ -115,12 +96,6 @@ def _write_title(titles: Sequence[tuple[str, str]], solvers: int) -> str:
         return ": ".join(dict.fromkeys(word for word in titles[0] if word != "objective"))
     goal = goals.pop()
     return f"{solvers} solvers on {len(titles)} problems" if goals else f"{goal[:1].upper()}{goal[1:]}"
-
-
-def _describe_command(file: StudyFile, records: Sequence[RunRecord]) -> tuple[str, ...]:
-    """Return date, version and command of the command that ran last."""
-    versions = dict.fromkeys(record.versions.get("nlp-gait", "unknown") for record in records)
-    return (f"{file.date[:10]}, version {', '.join(versions)}: {file.command}",) if file.command else ()
 
 
 def _describe_progress(file: StudyFile, records: Sequence[RunRecord]) -> tuple[str, ...]:

@@ -141,11 +141,6 @@ def make_folded_section(
     return Section(title=title, parts=(*sections, *ending), folded=True)
 
 
-def list_convergence(comparison: Comparison) -> tuple[Part, ...]:
-    """Return the gaps over costs."""
-    return (make_figure(comparison, "convergence"),)
-
-
 def list_costs(comparison: Comparison) -> tuple[Part, ...]:
     """Return the expected running times to targets, the effort, and the failed runs."""
     return (
@@ -200,14 +195,8 @@ def list_optimum(comparison: Comparison, gaits: Mapping[str, GaitCurves] | str) 
         "distance of the zero-moment point from the nearest edge of the support polygon, negative outside of it."
     )
     how = "`nlp-gait simulate RECORD.json` simulates a run's gait in MuJoCo (extra `sim`)."
-    return (
-        *_list_active(comparison),
-        *(
-            (make_chart_figure(f"{make_file_name(comparison.problem)}-curves", caption, charts), Prose(how))
-            if charts
-            else ()
-        ),
-    )
+    drawn = (make_chart_figure(f"{make_file_name(comparison.problem)}-curves", caption, charts), Prose(how))
+    return (*_list_active(comparison), *(drawn if charts else ()))
 
 
 def _list_active(comparison: Comparison) -> tuple[Section, ...]:

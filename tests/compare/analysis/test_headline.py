@@ -51,8 +51,8 @@ def test_a_study_without_ipopt_is_measured_from_the_shipped_value(runs: list[Run
     assert comparison.best is not None
     value = comparison.best.objective
     assert comparison.gap(-value) == pytest.approx((comparison.reference - value) / comparison.reference)
-    known = f"the proven optimum of {comparison.reference:.6f}"
-    assert re.fullmatch(rf"The median PSO run ends [0-9.]+ % below {known}\..*", write_headline(comparison))
+    known = f"the proven optimum {comparison.reference:.6f}"
+    assert re.fullmatch(rf"PSO's median run ends [0-9.]+ % below {known}\..*", write_headline(comparison))
 
 
 def test_a_better_run_is_announced_and_offered(runs: list[RunRecord], tmp_path: Path) -> None:
@@ -92,8 +92,8 @@ def test_a_single_value_is_compared_with_the_shipped_one() -> None:
 def test_the_headline_of_a_study_by_hand() -> None:
     """Medians over all runs: newton 10, swarm 10.55, colony 11.75 W; no pair differs significantly."""
     assert write_headline(compare_problems(study())[0]) == (
-        "The median swarm run ends 5.5 % above the best value found (10.000000 W), colony 18 % (order uncertain); newton "
-        "reaches it in 2 of 3 runs."
+        "swarm's median run ends 5.5 % above the best value found (10.000000 W), colony's 18 % (order uncertain); 2 of 3 newton "
+        "runs reach it."
     )
 
 
@@ -120,13 +120,13 @@ PROVEN = Reference(objective=10.0, bound=10.0, source="shipped, proven to six di
 
 def test_what_is_maximised_ends_below_the_optimum() -> None:
     assert describe(make_runs(pso=[9.0] * 3), PROVEN, "maximise").startswith(
-        "The median PSO run ends 10 % below the proven"
+        "PSO's median run ends 10 % below the proven"
     )
 
 
 def test_two_solvers_without_evaluations_or_times_are_compared() -> None:
     runs = [replace(r, counts={}, time_s=Times()) for r in make_runs(ipopt=[10.0] * 3)]
-    assert describe(runs, PROVEN) == "IPOPT reaches the proven optimum of 10.000000 W from all 3 starts."
+    assert describe(runs, PROVEN) == "All 3 IPOPT starts reach the proven optimum 10.000000 W."
 
 
 def test_the_users_solver_is_named_with_those_from_which_it_differs() -> None:
@@ -137,8 +137,8 @@ def test_the_users_solver_is_named_with_those_from_which_it_differs() -> None:
             made = record(solver, run, [(10, value + 2e-3 * run * (solver != "ipopt"))])
             records.append(replace(made, inputs=replace(made.inputs, code="0" * 64 if solver == "mine" else "")))
     assert write_headline(compare_problems(records)[0]) == (
-        "The median mine run ends 0.31 % above the best value found (10.000000 W), near 0.32 % (order uncertain), PSO 5.1 %; "
-        "IPOPT reaches it from all 12 starts. By rank-sum tests mine is better than PSO, worse than IPOPT and not "
+        "mine's median run ends 0.31 % above the best value found (10.000000 W), near's 0.32 % (order uncertain), PSO's 5.1 %; "
+        "all 12 IPOPT starts reach it. By rank-sum tests mine is better than PSO, worse than IPOPT and not "
         "distinguishable from near."
     )
 
@@ -166,7 +166,7 @@ def test_what_certainty_proved_in_a_folder_is_known_there(tmp_path: Path) -> Non
     (tmp_path / "certainty" / "broken-certificate.json").write_text("{}")
     runs = [replace(r, inputs=replace(r.inputs, problem=identify_problem(problem))) for r in make_runs(pso=[10.1] * 3)]
     (comparison,) = compare_problems(runs, folder=tmp_path / "results")
-    assert write_headline(comparison) == "The median PSO run ends 1.0 % above the proven optimum of 10.000000 W."
+    assert write_headline(comparison) == "PSO's median run ends 1.0 % above the proven optimum 10.000000 W."
     assert comparison.known.source == (
         "proven to six digits by `nlp-gait certainty` on this machine (toy-certificate.json)"
     )

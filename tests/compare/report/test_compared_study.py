@@ -19,7 +19,11 @@ def study() -> ComparedStudy:
 @pytest.mark.commit
 def test_one_call_compares_searches_with_ipopt(study: ComparedStudy, tmp_path: Path) -> None:
     assert [len(comparison.solvers) for comparison in study.comparisons] == [3, 3]
-    assert str(study).startswith("nao-dsp: The median ") and "above the proven optimum of 0.531886 W" in str(study)
+    assert (
+        str(study).startswith("nao-dsp: ")
+        and "median run ends" in str(study)
+        and "above the proven optimum 0.531886 W" in str(study)
+    )
     assert study.table("nao-ssp").splitlines()[1].split()[:2] == ["IPOPT", "1"]
     assert study.plot().axes
     frame = study.to_frame()

@@ -13,7 +13,7 @@ from compare.analysis.comparison import compare_problems
 from compare.analysis.headline import write_headline
 from compare.report import FurtherFiles, write_report
 from compare.report.study_report import make_study_document, renew_report
-from compare.study.study import StudyFile, write_record
+from compare.study.study import StudyFile, name_record, write_record
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Objective
 from tests.compare.records import FAST_X, judged, record, study
@@ -129,12 +129,12 @@ def test_tables_of_solvers_running_times_pairs_prices_and_failures(tables: Table
 def test_the_page_begins_with_the_answer_and_folds_the_rest(page: str, folder: Path) -> None:
     text = re.sub(r"<[^>]*>", " ", page.partition("<main>")[2])
     title, meta, task, *rest = (line.strip() for line in text.splitlines() if line.strip())
-    assert (title, task) == ("walk: power", "walk") and meta.startswith("2026-01-01, version 1.0: ")
+    assert (title, task) == ("walk: power", "walk") and meta.startswith("2026-01-01, v1.0: ")
     assert " ".join(" ".join(rest).split()).startswith(write_headline(compare_problems(study())[0]))
     assert (
         (folder / "report.md")
         .read_text(encoding="utf-8")
-        .startswith("# walk: power\n\n2026-01-01, version 1.0: nlp-gait compare")
+        .startswith("# walk: power\n\n2026-01-01, v1.0: nlp-gait compare")
     )
     folded = re.findall(r"<details><summary><h2>(.*?)</h2>", page)
     assert len(folded) == 5 and "All problems" not in page
@@ -194,3 +194,13 @@ def test_a_statistic_and_a_figure_are_added_as_documented() -> None:
     assert names["header"][-1] == "spread [%]"
     assert [row[-1] for row in names["rows"]] == ["0.00", "19.40", "29.94"]
     assert {"newton", "swarm", "colony"} <= {text.get_text() for text in names["figure"].axes[0].texts}
+
+
+def test_a_running_study_says_how_many_runs_have_ended(tmp_path: Path) -> None:
+    """Three of four planned runs have ended; runs that another command planned do not count."""
+    records = [record("a", run, [(100, value)]) for run, value in enumerate((0.9, 0.8, 0.7))]
+    planned = [*map(name_record, records), "walk/c-0000-00000000"]
+    write_report(tmp_path, records, replace(FILE, runs=(*planned, "walk/a-0003-00000000")))
+    assert "3 of 4 runs have ended" in (tmp_path / "report.html").read_text()
+    write_report(tmp_path, records, replace(FILE, runs=tuple(planned)))
+    assert "runs have ended" not in (tmp_path / "report.html").read_text()
