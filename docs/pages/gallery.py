@@ -24,7 +24,6 @@ ORDER = (
     "tune_in_engine.py",
     "export_motion.py",
     "notebook.py",
-    "slider.py",
     "cluster.py",
 )
 
@@ -44,7 +43,7 @@ def configuration(root: Path) -> dict[str, Any]:
         "image_scrapers": (figures,),
         "reset_modules": (),
         "capture_repr": ("_repr_html_", "__repr__"),
-        "ignore_repr_types": r"Figure|function",  # figures are shown as pictures, sliders in Jupyter alone
+        "ignore_repr_types": r"Figure",  # shown as a picture
         "abort_on_example_error": True,
         "download_all_examples": False,
         "remove_config_comments": True,

@@ -47,7 +47,6 @@ GALLERY_ALONE = (
     "front.py",
     "physics_engine.py",
     "notebook.py",
-    "slider.py",
     "cluster.py",
     "tune_in_engine.py",
 )
