@@ -214,10 +214,6 @@ class Continuation:
         self._solves = solves
         self._neighbour: Outcome | None = None
 
-    def solve(self, problem: GaitProblem) -> Solution:
-        """Return the solution of the next problem on the path, a copy of the first one with other parameter values."""
-        return make_solution(problem, self.run(problem), self._seed)
-
     def run(self, problem: GaitProblem, earlier: Sequence[Outcome] = (), stop: Stop = never) -> list[Outcome]:
         """Return runs of the next problem; the best of these and the earlier runs is the neighbour of the next problem.
 

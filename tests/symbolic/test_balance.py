@@ -5,8 +5,7 @@ import pytest
 from casadi import DM, SX
 
 from nlp_gait.formulation import Array
-from nlp_gait.symbolic.balance import LEAST_LOAD, combine_zmps, ground_load, zmp_of_point_masses, zmp_of_wrench
-from nlp_gait.symbolic.dynamics import Wrench
+from nlp_gait.symbolic.dynamics import LEAST_LOAD, Wrench, combine_zmps, ground_load, zmp_of_point_masses, zmp_of_wrench
 
 WEIGHT = 100.0
 

@@ -1,19 +1,140 @@
-"""Instances in the form that optimisers' packages take; each package is imported when it is needed."""
+"""Instances in the form that optimisers' packages take; packages are imported when they are needed."""
+
+from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from nlp_gait.errors import MissingExtraError, check_name, unknown
-from nlp_gait.providers import import_object
+from nlp_gait.formulation import Array
 
-# The function that converts an instance, and the packages that it needs.
-ADAPTERS: dict[str, tuple[str, tuple[str, ...]]] = {
-    "scipy": ("plain:to_scipy", ()),
-    "cma": ("plain:to_cma", ("cma",)),
-    "ioh": ("plain:to_ioh", ("ioh",)),
-    "pygmo": ("plain:to_pygmo", ("pygmo",)),
-    "pymoo": ("pymoo:PymooProblem", ("pymoo",)),
+if TYPE_CHECKING:
+    from nlp_gait.gaitbench.instance import Instance
+
+CMA_SIGMA = 0.25  # first step, as a share of each variable's range
+# A violation of 1 costs this many times the best known objective: ioh adds it to the objective that its algorithms see.
+IOH_PENALTY = 1e3
+
+
+def to_scipy(instance: Instance) -> dict[str, Any]:
+    """Return arguments of ``scipy.optimize.minimize``."""
+    return {
+        "fun": instance.objective,
+        "jac": instance.gradient,
+        "bounds": list(zip(instance.lower.tolist(), instance.upper.tolist(), strict=True)),
+        "constraints": [
+            {
+                "type": "ineq",  # SciPy's constraints are >= 0
+                "fun": lambda x: -instance.rows(np.asarray(x)[None])[0],
+                "jac": lambda x: -instance.jacobian(np.asarray(x)),
+            }
+        ],
+    }
+
+
+def to_cma(instance: Instance) -> dict[str, Any]:
+    """Return arguments of ``cma.fmin_con2``."""
+    groups = instance.sides.groups
+    first = np.array([k for k, group in enumerate(groups) if k == 0 or group != groups[k - 1]])
+
+    def worst_of_groups(x: Any) -> list[float]:
+        return np.maximum.reduceat(instance.rows(np.asarray(x)[None])[0], first).tolist()
+
+    return {
+        "objective_function": instance.objective,
+        "constraints": worst_of_groups,
+        "x0": ((instance.lower + instance.upper) / 2).tolist(),
+        "sigma0": CMA_SIGMA,
+        "options": {
+            "bounds": [instance.lower.tolist(), instance.upper.tolist()],
+            "CMA_stds": (instance.upper - instance.lower).tolist(),
+        },
+    }
+
+
+def to_ioh(instance: Instance) -> Any:
+    """Return a problem of ioh."""
+    import ioh
+
+    total = ioh.RealConstraint(
+        instance.violation,
+        weight=IOH_PENALTY * (abs(instance.best_known) or 1.0),
+        enforced=ioh.ConstraintEnforcement.SOFT,
+        name="violation",
+    )
+    problem = ioh.wrap_problem(
+        instance.objective,
+        name=f"GaitBench-{instance.id}",
+        problem_class=ioh.ProblemClass.REAL,
+        dimension=len(instance.names),
+        lb=float(instance.lower.min()),
+        ub=float(instance.upper.max()),
+        calculate_objective=lambda _, __: ioh.RealSolution(instance.best_x.tolist(), instance.best_known),
+        constraints=[total],
+    )
+    problem.bounds.lb, problem.bounds.ub = instance.lower.tolist(), instance.upper.tolist()
+    return problem
+
+
+def to_pygmo(instance: Instance) -> Any:
+    """Return a problem of pygmo."""
+    import pygmo
+
+    return pygmo.problem(_PygmoProblem(instance))
+
+
+class _PygmoProblem:
+    """The objective, then every row as an inequality, with dense gradients."""
+
+    def __init__(self, instance: Instance) -> None:
+        self.instance = instance
+
+    def fitness(self, x: Array) -> Array:
+        return self.batch_fitness(x)
+
+    def has_batch_fitness(self) -> bool:
+        return True
+
+    def batch_fitness(self, xs: Array) -> Array:
+        """Return the fitness of concatenated points, point by point."""
+        X = np.reshape(xs, (-1, len(self.instance.names)))
+        return np.hstack([self.instance(X)[0][:, None], self.instance.rows(X)]).ravel()
+
+    def gradient(self, x: Array) -> Array:
+        """Return the derivatives ((1 + m) n,), row by row."""
+        return np.vstack([self.instance.gradient(x), self.instance.jacobian(x)]).ravel()
+
+    def get_bounds(self) -> tuple[Array, Array]:
+        return self.instance.lower, self.instance.upper
+
+    def get_nic(self) -> int:
+        return len(self.instance.row_names)
+
+    def get_name(self) -> str:
+        return f"GaitBench {self.instance.id}"
+
+    def get_extra_info(self) -> str:
+        instance = self.instance
+        return f"\t{instance.definition.what}\n\tbest known: {instance.best_known!r}, {instance.evidence}"
+
+
+def to_pymoo(instance: Instance, *, rows: bool = False) -> Any:
+    """Return a problem of pymoo."""
+    from nlp_gait.gaitbench.adapters.pymoo import PymooProblem
+
+    return PymooProblem(instance, rows=rows)
+
+
+# The function that converts an instance, by the name of the package that it needs.
+ADAPTERS: dict[str, Callable[..., Any]] = {
+    "scipy": to_scipy,
+    "cma": to_cma,
+    "ioh": to_ioh,
+    "pygmo": to_pygmo,
+    "pymoo": to_pymoo,
 }
 
 
@@ -22,12 +143,9 @@ def find_adapter(name: str) -> Callable[..., Any]:
     check_name("adapter", name)
     if name not in ADAPTERS:
         raise unknown("adapter", name, ADAPTERS)
-    address, packages = ADAPTERS[name]
-    for package in packages:
-        if find_spec(package) is None:
-            raise MissingExtraError(
-                f"to({name!r}) needs the package {package}, which is not installed: pip install {package}, or all adapters' "
-                "packages: pip install 'nlp-gait[algorithms]'"
-            )
-    adapter: Callable[..., Any] = import_object(f"{__name__}.{address}")
-    return adapter
+    if find_spec(name) is None:
+        raise MissingExtraError(
+            f"to({name!r}) needs the package {name}, which is not installed: pip install {name}, or all adapters' "
+            "packages: pip install 'nlp-gait[algorithms]'"
+        )
+    return ADAPTERS[name]

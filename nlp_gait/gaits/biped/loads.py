@@ -9,8 +9,7 @@ from casadi import SX
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots.tree import make_point_masses, make_tree
-from nlp_gait.symbolic import balance
-from nlp_gait.symbolic.dynamics import Wrench, newton_euler
+from nlp_gait.symbolic.dynamics import Wrench, combine_zmps, ground_load, newton_euler, shift_down, zmp_of_wrench
 from nlp_gait.symbolic.rotations import UP, axis_rotation
 from nlp_gait.symbolic.trajectories import Motion
 
@@ -80,8 +79,8 @@ def make_single_support_loads(body: Body) -> Loader:
     def loads(now: Instant) -> Instant:
         torques, wrench = compute_torques(body, chain, now.joints)
         acting = find_zmp_wrench(body, chain, now.joints, wrench)
-        offset = balance.zmp_of_wrench(acting, foot.ankle_height_m, body.weight)
-        wrenches = {"L": balance.shift_down(wrench, foot.ankle_height_m), "R": SX(6, 1)}
+        offset = zmp_of_wrench(acting, foot.ankle_height_m, body.weight)
+        wrenches = {"L": shift_down(wrench, foot.ankle_height_m), "R": SX(6, 1)}
         return now._replace(torques=torques, zmp=now.ankles["L"][:2] + offset, wrenches=wrenches)
 
     return loads
@@ -128,10 +127,10 @@ def make_divided_loads(body: Body, rule: Division) -> Loader:
                 wrench, acting = (
                     Wrench(*(axis_rotation(UP, now.yaw) @ vector for vector in w)) for w in (wrench, acting)
                 )
-            wrenches[side] = balance.shift_down(wrench, height)
+            wrenches[side] = shift_down(wrench, height)
             torques |= of_half
-            zmps.append(now.ankles[side][:2] + balance.zmp_of_wrench(acting, height, weight))
-            ground_loads.append(balance.ground_load(acting, weight))
-        return now._replace(torques=torques, zmp=balance.combine_zmps(zmps, ground_loads), wrenches=wrenches)
+            zmps.append(now.ankles[side][:2] + zmp_of_wrench(acting, height, weight))
+            ground_loads.append(ground_load(acting, weight))
+        return now._replace(torques=torques, zmp=combine_zmps(zmps, ground_loads), wrenches=wrenches)
 
     return loads

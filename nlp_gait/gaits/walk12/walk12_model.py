@@ -19,7 +19,7 @@ import casadi as ca
 from casadi import DM, SX
 
 from nlp_gait.decoding import decode
-from nlp_gait.symbolic.balance import zmp_of_point_masses
+from nlp_gait.symbolic.dynamics import zmp_of_point_masses
 from nlp_gait.symbolic.kinematics import knee_cosine, leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.rotations import axis_rotation

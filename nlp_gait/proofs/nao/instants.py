@@ -17,8 +17,7 @@ from nlp_gait.gaits.nao.body import GRAVITY, move_arms
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, LEG_JOINTS, measure_leg
 from nlp_gait.proofs.nao import world_frame
 from nlp_gait.robots import Robot
-from nlp_gait.symbolic.balance import ground_load
-from nlp_gait.symbolic.dynamics import Wrench
+from nlp_gait.symbolic.dynamics import Wrench, ground_load
 from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic_of_sums, resting_point, stack
 
 PAIRS = (1, 3, 5)  # first of each pair of velocities at both ends: z, x, y

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.solve import Continuation, solve_both_ways
+from nlp_gait.backends.solve import Continuation, make_solution, solve_both_ways
 from nlp_gait.backends.solvers.solver import Solver, judge_point
 from nlp_gait.formulation import Array, Constraint, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome
@@ -38,7 +38,7 @@ def test_one_direction_stays_in_a_well_and_both_find_the_lower_one() -> None:
     problem = toy(two_wells)
     truth = [true_depth(limit) for limit in limits]
     one_way = Continuation(starts=8)
-    followed = [one_way.solve(problem).objective for problem in path(problem, limits)]
+    followed = [make_solution(p, one_way.run(p)).objective for p in path(problem, limits)]
     assert followed[0] == pytest.approx(truth[0], abs=TOLERANCE)
     assert followed[7] > truth[7] + 0.1  # still in the well on the right
     found = solve_both_ways(path(problem, limits), starts=8)
@@ -61,7 +61,7 @@ def test_infeasible_problems_are_named_and_the_path_continues() -> None:
 def test_a_warm_start_needs_fewer_iterations_than_a_cold_one() -> None:
     problems = path(toy(corner), np.linspace(1.1, 1.9, 9).tolist())
     warm = Continuation(starts=1)
-    first, *others = [warm.solve(problem).best.iterations for problem in problems]
+    first, *others = [min(warm.run(problem), key=lambda end: end.rank).iterations for problem in problems]
     assert max(others) < first
 
 

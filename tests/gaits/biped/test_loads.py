@@ -11,8 +11,7 @@ from casadi import DM, SX
 from nlp_gait.gaits.biped.loads import make_divided_loads, make_single_support_loads, share_torso
 from nlp_gait.gaits.biped.samples import Instant
 from nlp_gait.gaits.nao.body import make_nao
-from nlp_gait.symbolic.balance import shift_down
-from nlp_gait.symbolic.dynamics import Wrench
+from nlp_gait.symbolic.dynamics import Wrench, shift_down
 from nlp_gait.symbolic.trajectories import Motion
 
 BODY = replace(make_nao("nao-v5"), upright=frozenset())
