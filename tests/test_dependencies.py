@@ -68,18 +68,17 @@ def modules(package: str) -> list[str]:
 
 
 @cache
-def read_nodes(path: Path) -> tuple[ast.Import | ast.ImportFrom | ast.Constant | ast.Call, ...]:
-    """What the tests look at in a file: imports, texts that name a module, and calls of ``import_module``."""
+def read_nodes(path: Path) -> tuple[ast.Import | ast.ImportFrom | ast.Constant, ...]:
+    """What the tests look at in a file: imports and texts that name a module."""
     return tuple(
         node
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Import | ast.ImportFrom)
         or (isinstance(node, ast.Constant) and isinstance(node.value, str) and PLACE.fullmatch(node.value))
-        or (isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) == "import_module")
     )
 
 
-def nodes_of(module: str) -> tuple[ast.Import | ast.ImportFrom | ast.Constant | ast.Call, ...]:
+def nodes_of(module: str) -> tuple[ast.Import | ast.ImportFrom | ast.Constant, ...]:
     path = ROOT.joinpath(*module.split("."))
     return read_nodes(path / "__init__.py" if path.is_dir() else path.with_suffix(".py"))
 
@@ -138,18 +137,6 @@ def test_a_layer_imports_and_names_earlier_layers_only() -> None:
     assert not {module: wrong for module in ALL if (wrong := list(wrong_imports(module)))}
 
 
-def test_no_file_is_imported_by_its_own_name_as_a_text() -> None:
-    """``import_module`` with a constant is for optional packages of others."""
-    calls = [
-        f"{module}: import_module({node.args[0].value!r})"
-        for module in ALL
-        for node in nodes_of(module)
-        if isinstance(node, ast.Call) and isinstance(node.args[0], ast.Constant)
-        if within(str(node.args[0].value), *PACKAGES)
-    ]
-    assert not calls
-
-
 def test_files_do_not_import_each_other_in_a_circle() -> None:
     known = set(ALL)
     graph = {
@@ -176,19 +163,6 @@ def test_families_of_problems_do_not_import_each_other(family: str) -> None:
 def test_searches_import_neither_casadi_nor_gaits(module: str) -> None:
     bad = [name for name in imports(module) if within(name, "casadi", "nlp_gait", "compare")]
     assert not bad, f"{module} imports {bad}"
-
-
-def test_the_import_parser_sees_every_kind_of_import(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    package = tmp_path / "box" / "inner"
-    package.mkdir(parents=True)
-    (package / "__init__.py").write_text("from . import a\nfrom .. import b\n")
-    leaf = "import os.path\nfrom .a import c\nfrom ..d import e\nx = 'compare.cli:app', 'compare'\ndef f():\n    import json\n"
-    (package / "leaf.py").write_text(leaf)
-    monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path)
-    assert modules("box") == ["box.inner", "box.inner.leaf"]
-    assert list(imports("box.inner")) == ["box.inner.a", "box.b"]
-    assert sorted(imports("box.inner.leaf")) == ["box.d.e", "box.inner.a.c", "json", "os.path"]
-    assert list(named_modules("box.inner.leaf")) == ["compare.cli.app"]
 
 
 @pytest.mark.parametrize(

@@ -118,14 +118,6 @@ def test_no_two_classes_have_one_name() -> None:
     assert "GaitProblem" in names and not [name for name, count in names.items() if count > 1]
 
 
-def test_the_check_finds_what_it_looks_for() -> None:
-    assert find_words("fine\nmade anew by somebody, and mended") == ["2: anew", "2: somebody", "2: mended"]
-    code = "def understood(): ...\nclass A:\n    def _tied(self): ...\n    @property\n    def closed(self): ...\n"
-    assert find_participles(code) == ["1: understood", "3: _tied"]
-    code = "def hip(): ...\ndef locate_hip(): ...\ndef _hip(): ...\n@maker\ndef walk12(): ...\n"
-    assert find_nouns(code) == ["1: hip"]
-
-
 def test_no_archive_may_hold_objects() -> None:
     """All else that makes code from data is refused by ruff."""
     for package in ("compare", "metaheuristics", "nlp_gait"):

@@ -7,7 +7,7 @@ from casadi import MX, sqrt
 from nlp_gait import compile_objective, solve
 from nlp_gait.backends.exact import ExactValues, build_exact_model
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Constraint, GaitProblem, load
+from nlp_gait.formulation import Constraint, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import corner, row, row_violations, toy
@@ -26,25 +26,11 @@ def test_cost_rows_and_violation_by_hand() -> None:
     assert out.upper == pytest.approx([np.inf, 2.0, 3.0])
 
 
-@pytest.mark.parametrize("x", [(0.0,), (0.0, 1.5, 1.0)])
-def test_a_point_of_another_length_is_refused(x: tuple[float, ...]) -> None:
-    with pytest.raises(ValueError, match="reshape"):
-        evaluate(toy(corner), x)
-
-
 def test_a_candidate_outside_the_bounds_violates_them_in_units_of_their_range() -> None:
     out = evaluate(toy(corner), (3.0, 1.0))
     assert out.violation == pytest.approx(1.0 / 4.0)
     assert build_exact_model(toy(corner)).row_names == ("row", "bounds[x]", "bounds[y]")
     assert build_exact_model(toy(corner)).row_units == ("m", "m", "m")
-
-
-def test_a_two_sided_row_counts_both_ways() -> None:
-    def mathematics(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
-        return x, (row(x, lower=-limit, upper=limit),)
-
-    for x, violation in ((0.7, 2.0), (-0.6, 1.0), (0.2, 0.0)):
-        assert evaluate(toy(mathematics), (x, 1.0)).violation == pytest.approx(violation)
 
 
 def test_what_is_maximised_costs_its_negative_and_is_indexed_as_it_is() -> None:
@@ -62,17 +48,6 @@ def test_violated_rows_are_named_worst_first() -> None:
     assert [r.violation for r in rows] == pytest.approx([2.75, 0.25])
     assert (rows[0].value, rows[0].lower, rows[0].upper) == (-2.25, 0.5, None)
     assert row_violations(toy(corner), np.array([0.5 - 0.5 * FEASIBILITY_TOLERANCE, 1.0])) == ()
-
-
-@pytest.mark.parametrize(("name", "rows"), [("nao-ssp", 376 + 9), ("nao-dsp", 376 + 8)])
-def test_the_rows_of_a_nao_phase_are_all_there_and_named(name: str, rows: int) -> None:
-    """11 samples of 10 angles, 2 knees and 2 margins, 10 changes of 22 torques, 2 means, and the variables' bounds."""
-    assert rows - len(load(name).names) == 11 * (10 + 2 + 2) + 10 * 22 + 2
-    exact = build_exact_model(load(name))
-    assert len(exact.row_names) == len(set(exact.row_names)) == len(exact.row_units) == rows
-    assert {"joint_angle[LKneePitch, 3]", "torque_change[RWristYaw, 9]", "dbm_x[10]", "dbm_y_mean"} < set(
-        exact.row_names
-    )
 
 
 def test_an_objective_in_units_that_are_too_large_is_refused_everywhere() -> None:

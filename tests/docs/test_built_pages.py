@@ -21,12 +21,6 @@ def test_a_notebook_has_several_cells_with_prose_between_them(name: str) -> None
     assert not any(first == second == "code" for first, second in zip(kinds, kinds[1:], strict=False))
 
 
-@pytest.mark.parametrize("name", ORDER)
-def test_an_example_reads_no_arguments(name: str) -> None:
-    """A kernel has arguments of its own."""
-    assert "argv" not in (EXAMPLES / name).read_text(encoding="utf-8")
-
-
 @pytest.mark.parametrize(("name", "printed", "file"), [("first_solve.py", "limited by dbm_y_mean", "gait.png")])
 def test_a_notebook_runs_in_an_empty_folder(name: str, printed: str, file: str, tmp_path: Path) -> None:
     text, figures = run_notebook(make_notebook(EXAMPLES / name), tmp_path)

@@ -40,11 +40,6 @@ def test_every_number_of_a_page_is_recorded(name: str) -> None:
     assert [definition for definition in definitions if definition not in text] == []
 
 
-def test_measured_numbers_are_recognised() -> None:
-    text = "needs 0.85 W, `1 mm`, 2 of 3 starts, 12 % more and 5 ms, on a sole of 80 mm"
-    assert find_measured(text, ["a sole of 80 mm"]) == ["0.85 W", "12 %", "5 ms"]
-
-
 def test_every_number_has_its_origin_and_a_reader() -> None:
     numbers = read_numbers()
     text = "\n".join(path.read_text(encoding="utf-8") for path in PAGES.values())

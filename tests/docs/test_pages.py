@@ -1,6 +1,5 @@
 """Generated pages: none is missing, each says what its object is, and the check of a site finds what is wrong."""
 
-import ast
 import importlib
 import re
 from pathlib import Path
@@ -11,18 +10,11 @@ from compare.cli import PANELS, load_command
 from compare.study.run import list_solvers
 from docs.check import faults_of
 from docs.pages import algorithms, api, commands, playground, problems
-from docs.pages.gallery import ORDER
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.formulation import list_problems, load
 
 ROOT = Path(__file__).parents[2]
 OWN = ("nlp_gait", "metaheuristics", "compare")
-
-
-def imported(text: str) -> set[tuple[str, str]]:
-    """Modules and names that a text in Python imports from this package."""
-    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom) and node.module]
-    return {(str(n.module), alias.name) for n in nodes if str(n.module).split(".")[0] in OWN for alias in n.names}
 
 
 def test_no_public_name_is_missing_from_the_reference(tmp_path: Path) -> None:
@@ -45,16 +37,6 @@ def doors() -> list[tuple[str, str]]:
             if "__all__" in path.read_text(encoding="utf-8"):
                 found.append((package, path.parent.name))
     return found
-
-
-@pytest.mark.parametrize("name", ORDER)
-def test_what_an_example_imports_is_in_the_reference(name: str) -> None:
-    """Formulas and drawings apart, which are no interface."""
-    named = {(door, known) for door in api.DOORS for known in api.names_of(door)}
-    known = {name for _, name in named}
-    for module, name_ in imported((ROOT / "examples" / name).read_text(encoding="utf-8")):
-        inside = module.split(".")[:2] in (["nlp_gait", "symbolic"], ["compare", "drawing"])
-        assert inside or name_ in known or (module, name_) in named, f"{module}.{name_}"
 
 
 def test_a_page_for_each_command_with_every_option(tmp_path: Path) -> None:

@@ -166,8 +166,6 @@ def test_the_sharpest_turn_names_its_limit(body: Humanoid) -> None:
         ("0,0,0", r"foothold 1 must be four numbers x_m,y_m,z_m,yaw_deg, got '0,0,0'"),
         ("0.05,-0.05,0.1,0", r"foothold 1 is 0.1 m high, but footholds are planned on a level floor"),
         ("0.05,nan,0,0", r"foothold 1 must be finite and within 10000 m and 36000 degrees of the start"),
-        ("0.05,1e308,0,0", r"foothold 1 must be finite and within 10000 m"),
-        ("0.05,0,0,1e308", r"foothold 1 must be finite and within 10000 m"),
         ("0,-0.05,0,0", r"a walk has 2 to 100 footholds, got 1"),
         ("0.05,0.05,0,0;0.05,0.05,0,0", r"in step 1 the swinging sole passes over the standing one; take more steps"),
         ("0.05,-0.05,0,0;0.05,0.05,0,0;0.1,-0.05,0,0", r"steps must be the number of footholds, 3, got 4"),

@@ -102,7 +102,6 @@ def test_objects_classes_and_makers_are_algorithms() -> None:
             {},
             "'own' cannot be called as an algorithm: missing a required argument: 'f'; a plain function takes",
         ),
-        (ParticleSwarm, {"popl": 3}, "cannot be called as an algorithm: got an unexpected keyword argument 'popl'"),
         (Plain(), {"width": 1.0}, "'own' takes no settings, got width: it is not a data class"),
         (type("Odd", (), {"start": print, "population": 2.5}), {}, "population must be a whole number >= 1, got 2.5"),
     ],

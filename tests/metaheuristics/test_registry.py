@@ -32,10 +32,6 @@ def test_a_package_that_is_missing_is_named_and_left_out_of_all(monkeypatch: pyt
             make_algorithm(name)
 
 
-def test_settings_of_pymoos_own_are_passed_on() -> None:
-    assert make_algorithm("pymoo:GA", settings={"nonsense": 1, "seed": 1}).population == 50
-
-
 @pytest.mark.parametrize("name", ["cma", *(f"pymoo:{name}" for name in MODULES)])
 def test_searches_of_other_packages_start_from_the_shared_points_and_leave_the_global_generator(name: str) -> None:
     def run(name: str, evaluations: int) -> tuple[Result, Array]:

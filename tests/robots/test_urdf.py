@@ -147,7 +147,6 @@ DAMAGES = [
     ),
     (change(f"{KNEE}/child", "link", "torso"), r"exactly one link must have no parent, got LTibia|ring|none"),
     (change(KNEE, "name", "RKneePitch"), r"joint 'RKneePitch' appears twice"),
-    (change("link[@name='LTibia']", "name", "RTibia"), r"link 'RTibia' appears twice"),
     (change(KNEE, "type", "hinge"), r"joint 'LKneePitch': type must be one of revolute, .*, got 'hinge'"),
 ]
 
@@ -183,13 +182,6 @@ def test_entities_are_refused_unread(tmp_path: Path, definition: str, use: str) 
     assert "hunter2" not in str(error.value)
 
 
-def test_a_urdf_alone_without_shapes_is_answered_with_what_to_write(tmp_path: Path) -> None:
-    path = stored(tmp_path, as_urdf(nao()))
-    (tmp_path / "robot.json").unlink()
-    with pytest.raises(RobotDataError, match=r"no shape for its sole; write its sole into the JSON"):
-        load_robot(path)
-
-
 def test_the_robot_file_next_to_a_urdf_must_extend_it(tmp_path: Path) -> None:
     path = stored(tmp_path, as_urdf(nao()), partner(nao(), "other.urdf"))
     with pytest.raises(RobotDataError, match=r"robot\.json': 'extends' must be 'robot\.urdf', the file next to it"):
@@ -201,8 +193,6 @@ def test_the_robot_file_next_to_a_urdf_must_extend_it(tmp_path: Path) -> None:
     [
         ({"LKneePitch": "left_knee"}, r"unknown joint in joint_names of .*robot\.json' 'left_knee'"),
         ({"RKneePitch": "LKneePitch"}, "joint_names gives 'RKneePitch' to 'LKneePitch', but that name is taken"),
-        (["LKneePitch"], r"joint_names must be an object, got \['LKneePitch'\]"),
-        ({"LKneePitch": 3}, r"robot\.json': joint_names\.LKneePitch must be a text, got 3"),
     ],
 )
 def test_joint_names_that_fit_no_joint_are_refused(tmp_path: Path, names: object, message: str) -> None:

@@ -34,13 +34,10 @@ def _repeat(*counts: int) -> str:
 
 
 BOMBS = (
-    *(_write_model(body=_repeat(*counts)) for counts in ((2_000_000_000,), (1000, 1000, 1000), (7, 300, 5000))),
+    *(_write_model(body=_repeat(*counts)) for counts in ((2_000_000_000,), (7, 300, 5000))),
     _write_model('<size nkey="2000000000"/>'),
-    *(_write_model(f'<size {name}="200000000"/>') for name in ("nuser_geom", "nuser_body")),
-    *(
-        _write_model(f'<asset><hfield name="h" nrow="{side}" ncol="{side}" size="1 1 1 1"/></asset>')
-        for side in (20_000, 40_000)
-    ),
+    _write_model('<size nuser_geom="200000000"/>'),
+    _write_model('<asset><hfield name="h" nrow="40000" ncol="40000" size="1 1 1 1"/></asset>'),
     _write_model('<include file="pipe"/>'),
     _write_model(
         '<compiler meshdir="."/><asset><mesh name="m" file="pipe.obj"/></asset>', '<geom type="mesh" mesh="m"/>'
@@ -88,9 +85,8 @@ JOINTS = '<body><joint/><geom size="1"/></body>'
             "has 40000 links and joints, more than 2000; simplify",
         ),
         (load_robot, "joints.xml", _write_model(body=JOINTS * 401), "has 401 turning joints, more than 400; remove"),
-        (load_robot, "joints.xml", _write_model(body=JOINTS * 900), "has 900 turning joints, more than 400; remove"),
     ],
-    ids=["instances of a shape", "links", "401 joints", "900 joints"],
+    ids=["instances of a shape", "links", "401 joints"],
 )
 def test_what_is_too_long_is_rejected(
     tmp_path: Path, read: Callable[[Any], object], name: str, text: str, message: str

@@ -253,8 +253,6 @@ def test_a_push_after_the_end_is_refused(standing: Plan) -> None:
     ("text", "words"),
     [
         ("[balance]\ndcm_gain = -1.0", "dcm_gain of a balance feedback must be from 0 to 1000, got -1.0"),
-        ("[balance]\nperiod_s = 2.0", "period_s of a balance feedback must be from 0.0001 to 1, got 2.0"),
-        ("full_error_rad = 1e308", "full_error_rad of a drive must be from 1e-09 to 1000, got 1e+308"),
         ("[controller]\nkp = 1e308\nkd = 1", "kp of a controller must be from 1e-06 to 1e+09, got 1e+308"),
         ("[balance]\n[controller]\nkp = 1\nkd = 1", "a drive has a controller or a feedback, got both"),
     ],

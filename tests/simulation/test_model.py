@@ -26,7 +26,6 @@ NAO = load_robot("nao-v5")
     [
         (lambda: Drive(torque_limits="peak"), "urdf, stall, continuous, got 'peak'"),
         (lambda: Conditions(friction=-1.0), "friction of a simulation must be from 1e-06 to 1e.06, got -1.0"),
-        (lambda: Conditions(slope_rad=(2.0, 0.0)), "slope_rad"),
         (lambda: make_shapes(NAO, "oval"), "rectangle, polygon, got 'oval'"),
     ],
 )

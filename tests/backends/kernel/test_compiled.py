@@ -89,15 +89,6 @@ def test_takes_any_memory_and_leaves_it_as_it_was() -> None:
     assert objective(X.tolist())[0].tolist() == f.tolist()
 
 
-def test_an_empty_batch_gives_empty_results() -> None:
-    f, violation = read_objective("nao-ssp")(np.empty((0, 9)))
-    assert f.shape == violation.shape == (0,)
-    assert read_objective("nao-ssp").constraints(np.empty((0, 9))).shape == (
-        0,
-        len(read_objective("nao-ssp").row_names),
-    )
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_a_row_that_is_not_finite_fails_alone(bad: float) -> None:
     objective, X = read_objective("nao-ssp"), candidates(problem_named("nao-ssp"), 20)
@@ -138,12 +129,6 @@ def test_parameters_change_without_a_new_library(monkeypatch: pytest.MonkeyPatch
     assert fixed.names == problem.names
     value = build_exact_model(problem).at(X[0], strict.problem.p).cost
     assert strict_f[0] == pytest.approx(value, rel=COST_TOLERANCE)
-
-
-def test_a_maximised_objective_is_negated() -> None:
-    problem = toy(lambda x, y, limit, ops: (x + 2 * y, ()), sense="maximise")
-    f, _ = compile_objective(problem, require_compiler=True)(np.array([[1.0, 2.0], [0.0, -1.0]]))
-    assert f.tolist() == [-5.0, 2.0]
 
 
 @pytest.mark.parametrize("lanes", LANES)
@@ -211,12 +196,10 @@ def test_what_amplifies_rounding_is_the_same_on_many_lanes_as_on_one(lanes: int)
         np.ma.masked_array(np.zeros((1, 9)), mask=np.eye(1, 9)),
         np.full((1, 9), "0.1"),
         np.ones((1, 9), dtype=bool),
-        np.full((1, 9), "2026-01-01", dtype="datetime64[D]"),
         np.full((1, 9), None),
-        np.full((1, 9), "0.1", dtype=object),
         [[0.1] * 8 + [True]],
     ],
-    ids=["complex", "masked", "text", "true", "date", "none", "text object", "true among numbers"],
+    ids=["complex", "masked", "text", "true", "none", "true among numbers"],
 )
 def test_what_numpy_would_make_numbers_of_in_silence_is_refused(given: Any) -> None:
     problem, objective = problem_named("nao-ssp"), read_objective("nao-ssp")

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import make_solution, solve
 from nlp_gait.backends.solvers.ipopt import CONVERGED, STATUS_WORDS, IpoptSettings, find_linear_solver
 from nlp_gait.backends.solvers.solver import judge_point
 from nlp_gait.formulation import Constraint
 from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from tests.backends.toys import Mathematics, corner, row, row_violations, toy
+from tests.backends.toys import Mathematics, corner, row, toy
 
 Result = tuple[MX, tuple[Constraint, ...]]
 
@@ -72,16 +71,6 @@ def test_starts_from_where_a_row_has_no_value_do_not_hide_the_others() -> None:
     assert {start.converged for start in solution.starts} == {True, False}
 
 
-def test_a_row_without_a_value_is_violated_and_named() -> None:
-    problem = toy(lambda x, y, limit, ops: (x + y, (row(ca.sqrt(x), lower=limit), row(y, upper=limit))))
-    x = np.array([-1.0, 2.0])
-    assert math.isnan(build_exact_model(problem).at(x, problem.p).violation)
-    rows = row_violations(problem, x)
-    assert [violated.name for violated in rows] == ["row", "row"]
-    assert math.isnan(rows[0].violation)
-    assert rows[1].violation == pytest.approx(1.5)
-
-
 def end(claimed: bool, cost: float, violation: float) -> Outcome:
     """An outcome with what its rank depends on."""
     none, rest = (
@@ -100,37 +89,6 @@ def test_outcomes_rank_by_convergence_then_feasibility_then_violation() -> None:
     assert [item.converged for item in ranked] == [True, True, *[False] * 5]
     assert not end(True, math.nan, 0.0).converged
     assert set(CONVERGED) < set(STATUS_WORDS)
-
-
-@pytest.mark.parametrize(
-    ("returned", "words"),
-    [
-        ("Solve_Succeeded", "converged, but the exact functions find it infeasible"),
-        ("Restoration_Failed", "restoration of feasibility failed"),
-        ("Insufficient_Memory", "insufficient memory"),
-    ],
-)
-def test_what_ipopt_returns_is_described_in_words(returned: str, words: str) -> None:
-    """The limit is out of reach, so that the exact functions find every point infeasible."""
-    problem = toy(corner, limit=2.5)
-    ready = IpoptSettings().prepare(problem)
-    ready.cold = Returning(ready.cold, returned)  # type: ignore[assignment]
-    ready.patient = Returning(ready.patient, returned)  # type: ignore[assignment]
-    outcome = ready.run(problem, np.array([-2.0, -1.0]))
-    assert (outcome.converged, outcome.claimed, outcome.status) == (False, False, words)
-
-
-class Returning:
-    """A solver of CasADi's that returns another status."""
-
-    def __init__(self, solver: ca.Function, status: str) -> None:
-        self.solver, self.status = solver, status
-
-    def __call__(self, **named: object) -> object:
-        return self.solver(**named)
-
-    def stats(self) -> dict[str, object]:
-        return {**self.solver.stats(), "return_status": self.status}
 
 
 def test_options_that_lie_in_the_working_folder_change_nothing(

