@@ -46,10 +46,10 @@ KINDS: dict[str, dict[str, str]] = {
 }
 
 
-def simulate_walk(result: Result, steps: int, drive: Drive | None = None, sole: str = "rectangle") -> Walk:
+def simulate_walk(result: Result, steps: int, drive: Drive | None = None) -> Walk:
     """Simulate several steps of a cycle and measure them."""
     drive, plan = drive or Drive(), make_plan(result, steps)
-    return measure_walk(plan, simulate_plan(plan, drive=drive, sole=sole), drive, steps)
+    return measure_walk(plan, simulate_plan(plan, drive=drive), drive, steps)
 
 
 def waterfall() -> Iterator[str]:
@@ -157,7 +157,7 @@ def published() -> Iterator[str]:
     for name in PAPER:
         for label, gait in phase_gaits(name).items():
             m, old = _simulate(gait, Drive()), _simulate(gait, DRIVES["held"])
-            landing = ", ".join(f"{1e3 * at.error_m:.1f}" for at in m.landings.values()) or "-"
+            landing = ", ".join(f"{1e3 * error:.1f}" for error in m.landing_errors_m.values()) or "-"
             yield cells(
                 f"{name}, {label}{', **falls**' if m.fallen else ''}",
                 *(f"{p.total_W:.4f} ({p.mechanical_W:.4f})" for p in (m.predicted, m.measured)),

@@ -23,7 +23,7 @@ def stairs() -> Iterator[str]:
     for label, result in climbs():
         plan = make_plan(result)
         m = measure(plan, simulate_plan(plan), Drive())
-        landing = 1e3 * m.landings["right"].error_m
+        landing = 1e3 * m.landing_errors_m["right"]
         yield cells(
             label,
             describe_result(m),

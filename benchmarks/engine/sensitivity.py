@@ -38,7 +38,7 @@ def engine_step(step_s: float) -> Iterator[None]:
 
 
 def gains() -> Iterator[str]:
-    """How the optima fare with other gains, limits, periods, soles, and steps of the engine."""
+    """How the optima fare with other gains, limits, periods, and steps of the engine."""
     yield header(
         "variant",
         "nao-ssp W",
@@ -51,14 +51,13 @@ def gains() -> Iterator[str]:
     cycle = optimal_cycles()[SPEED]
     plans = [make_plan(optimum(name)) for name in PAPER]
 
-    def row(label: str, drive: Drive, sole: str = "rectangle") -> str:
-        powers = [measure(plan, simulate_plan(plan, drive=drive, sole=sole), drive) for plan in plans]
+    def row(label: str, drive: Drive) -> str:
+        powers = [measure(plan, simulate_plan(plan, drive=drive), drive) for plan in plans]
         phases = [f"{m.measured.total_W:.4f}{', falls' if m.fallen else ''}" for m in powers]
-        return cells(label, *phases, *format_energies(simulate_walk(cycle, STEPS, drive, sole)))
+        return cells(label, *phases, *format_energies(simulate_walk(cycle, STEPS, drive)))
 
     for label, drive in VARIANTS.items():
         yield row(label, drive)
-    yield row("true outline of the soles", Drive(), "polygon")
     for step_s in (0.001, 0.00025, 0.0001):
         with engine_step(step_s):
             yield row(f"engine step {1e3 * step_s:g} ms", Drive())

@@ -93,7 +93,6 @@ def simulate(
     page: Annotated[Path | None, Option(metavar="FILE.html"), OUTPUT_FILE] = None,
     video: Annotated[Path | None, OUTPUT_FILE] = None,
     live: Annotated[bool, Option("--live")] = False,
-    sole: str = "rectangle",
     world: ConditionOptions,
     drive_options: DriveOptions,
 ) -> Output:
@@ -129,18 +128,18 @@ def simulate(
         faults = find_faults(result, stored.result)
     if video is not None:
         check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
-    simulation = SimulationRun(plan, conditions, drive, sole)
+    simulation = SimulationRun(plan, conditions, drive)
     pushes, failures = _watch(simulation) if live else ([], [])
     trace, written = simulation.finish(), [path for path in (page, video) if path is not None]
     data, parts = _report(plan, trace, drive, pushes)
     data["faults"], parts = faults, [*faults, *parts]
-    model, _ = prepare(plan, conditions, drive, sole)
+    model, _ = prepare(plan, conditions, drive)
     if page is not None:
-        _write_page(page, make_skeleton(plan, trace, model, sole, result.problem.title), trace)
+        _write_page(page, make_skeleton(plan, trace, model, result.problem.title), trace)
     if video is not None:
         write_video(video, _show_pictures(draw_pictures(plan, trace, model), len(list_frames(trace))), FRAMES_PER_S)
     if folder is not None:
-        xml = make_plan_model(plan, drive, sole, conditions.friction, conditions.bumps)
+        xml = make_plan_model(plan, drive, conditions.friction, conditions.bumps)
         written += _write_report(folder, data, xml, trace.signals(plan.joints))
         written.append(plot_simulation(plan, trace, drive, folder / "simulation.png"))
     return Output(data=data, parts=parts, written=written, failures=failures)
@@ -222,7 +221,7 @@ def _describe(report: Measurements, mode: str) -> Iterator[str | Rows]:
         "centre of pressure to planned ZMP, RMS": report.pressure_rms_m,
         "- RMS in the middle 60 % of the phase": report.pressure_middle_rms_m,
         "slip of a supporting foot": report.slip_m,
-        **{f"landing error, {side} foot": landing.error_m for side, landing in report.landings.items()},
+        **{f"landing error, {side} foot": error for side, error in report.landing_errors_m.items()},
     }
     rows = [(name, format_millimetres(value)) for name, value in lengths.items()]
     tracking = f"{report.tracking_rms_rad:.4f} rad RMS, {report.tracking_max_rad:.4f} rad largest"

@@ -156,7 +156,7 @@ def simulate_point(spec: ProblemSpec, x: Sequence[float]) -> dict[str, float | N
     return {
         "fell_at_s": measured.fell_at_s,
         "tilt_deg": measured.largest_tilt_deg,
-        "landing_m": max((landing.error_m for landing in measured.landings.values()), default=0.0),
+        "landing_m": max(measured.landing_errors_m.values(), default=0.0),
         "rise_m": float(simulation.torso[-1, 2] - simulation.torso[0, 2]),
         "outside": len(measured.joint_limits),
     }

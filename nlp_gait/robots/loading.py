@@ -21,15 +21,14 @@ from nlp_gait.robots.inference import EXTENTS, SIDES, Feet, Legs, Side, check_si
 from nlp_gait.robots.packages import MARK, MODEL_ENDINGS, find_kind, find_robot_file
 from nlp_gait.robots.perturbation import perturb, split_name
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, check_robot_name, make_unit_axis
-from nlp_gait.robots.tree import check_inertias, move_along_axis, move_root, reverse_joint, shift_to_com
+from nlp_gait.robots.tree import check_inertias, move_along_axis, move_root, shift_to_com
 from nlp_gait.robots.welding import Joints, Links, RobotParts, find_faults, weld_faults
 
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
-LONGEST_CHAIN = 8  # of robots that extend each other
 NEGLIGIBLE_M = 1e-6  # published origins are rounded to this
 MOST_JOINTS = 400  # among which legs are searched, which takes 2 s then, and eight times as long for twice as many
 # Fields that replace those of the extended file.
-REPLACED = ("name", "description", "root", "forward", "heat_loss_W_per_Nm2")
+REPLACED = ("name", "description", "root", "forward", "heat_loss_W_per_Nm2", "inertia_about")
 
 # Robots from files by name or path, while ``hold_robots`` is active.
 _held: ContextVar[dict[str, Robot] | None] = ContextVar("held_robots", default=None)
@@ -48,7 +47,6 @@ class RobotFile:
     conventions: Any = None
     sources: Mapping[str, str] = field(default_factory=dict)
     inertia_about: Literal["com", "joint"] | None = None
-    joint_names: Mapping[str, str] = field(default_factory=dict)
     root: str | None = None
     links: Mapping[str, Any] = field(default_factory=dict)
     joints: Mapping[str, Any] = field(default_factory=dict)
@@ -60,7 +58,7 @@ class RobotFile:
     def __post_init__(self) -> None:
         if self.name is not None:
             check_robot_name(self.name, "robot")
-        for group in ("links", "joints", "joint_names"):
+        for group in ("links", "joints"):
             for name in getattr(self, group):
                 check_robot_name(name, group)
 
@@ -72,7 +70,6 @@ class RobotDescription:
     file: RobotFile
     links: Mapping[str, Link]
     joints: Mapping[str, Joint]
-    unstated: tuple[str, ...]  # links whose file does not state the reference point of tensors
     model: RobotParts | None = field(default=None, repr=False)  # the URDF or MJCF that it extends
     model_path: str = field(default="", repr=False)  # the file may be moved
 
@@ -179,7 +176,7 @@ def _describe(source: str, extending: tuple[str, ...] = ()) -> RobotDescription:
     if file.extends is None:
         return description
     base_source = _resolve(file.extends, source)
-    if base_source in extending or len(extending) >= LONGEST_CHAIN:
+    if base_source in extending:
         raise RobotDataError(f"robot {source!r}: 'extends' must name another robot, got {file.extends!r}")
     if _is_model(base_source):
         base = _read_model(base_source, file.inertia_about)
@@ -196,8 +193,7 @@ def _describe(source: str, extending: tuple[str, ...] = ()) -> RobotDescription:
         base,
         file=merged,
         links={**base.links, **description.links},
-        joints={**_rename(base.joints, file.joint_names, source), **description.joints},
-        unstated=(*(name for name in base.unstated if name not in description.links), *description.unstated),
+        joints={**base.joints, **description.joints},
     )
 
 
@@ -213,10 +209,7 @@ def _read_model(source: str, inertia_about: str | None) -> RobotDescription:
         # The constructor checks the names.
         file = RobotFile(name=model.name, description=f"from {Path(source).name}", root=model.root)
         replace(file, links=model.links, joints=model.joints)
-    unstated = tuple(model.links if inertia_about is None else ())
-    return RobotDescription(
-        file=file, links=model.links, joints=model.joints, unstated=unstated, model=model, model_path=source
-    )
+    return RobotDescription(file=file, links=model.links, joints=model.joints, model=model, model_path=source)
 
 
 def _decode_parts(file: RobotFile, source: str) -> RobotDescription:
@@ -229,23 +222,7 @@ def _decode_parts(file: RobotFile, source: str) -> RobotDescription:
     joints = {name: replace(joint, axis=make_unit_axis(joint.axis)) for name, joint in joints.items()}
     for fault in (*find_faults(links).values(), *find_faults(joints).values()):
         raise fault
-    unstated = tuple(links if file.inertia_about is None else ())
-    return RobotDescription(file=replace(file, links={}, joints={}), links=links, joints=joints, unstated=unstated)
-
-
-def _rename(joints: Mapping[str, Joint], names: Mapping[str, str], source: str) -> Joints:
-    """Return joints with new names, given as new to old; a minus sign in front of the old name reverses the joint."""
-    old = {new: name.removeprefix("-") for new, name in names.items()}
-    for name in old.values():
-        if name not in joints:
-            raise unknown(f"joint in joint_names of {source!r}", name, joints)
-    renamed = {name: joint for name, joint in joints.items() if name not in old.values()}
-    for new, name in old.items():
-        if new in renamed:
-            raise RobotDataError(f"robot {source!r}: joint_names gives {new!r} to {name!r}, but that name is taken")
-        joint = reverse_joint(joints[name]) if names[new].startswith("-") else joints[name]
-        renamed[new] = replace(joint, name=new)
-    return renamed
+    return RobotDescription(file=replace(file, links={}, joints={}), links=links, joints=joints)
 
 
 def _resolve(base: str, source: str) -> str:
@@ -278,7 +255,8 @@ def _make_robot(description: RobotDescription, source: str) -> Robot:
             feet = _complete(description, description.model, links, joints, feet, notes)
     with convert_errors(f"robot file {source!r}", RobotDataError):
         soles = {side: decode(Foot, foot, f"feet.{side}") for side, foot in feet.items()}
-    check_inertias(file.name, [link for name, link in links.items() if name in description.unstated])
+    if file.inertia_about is None:
+        check_inertias(file.name, list(links.values()))
     return Robot(
         name=file.name,
         description=file.description or "",

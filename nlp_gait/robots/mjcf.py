@@ -27,7 +27,7 @@ from nlp_gait.robots.tree import Array, Mass, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
 LOG = logging.getLogger("nlp_gait")
-JOINT_HINGE, JOINT_TRANSMISSIONS = 3, (0, 1)  # mjJNT_HINGE; mjTRN_JOINT and mjTRN_JOINTINPARENT
+JOINT_FREE, JOINT_HINGE, JOINT_TRANSMISSIONS = 0, 3, (0, 1)  # mjJNT_FREE, _HINGE; mjTRN_JOINT and mjTRN_JOINTINPARENT
 
 
 def read_mjcf(path: str) -> RobotParts:
@@ -39,20 +39,22 @@ def read_mjcf(path: str) -> RobotParts:
     """
     model = _compile(path)
     notes: list[str] = []
-    poses = _place_bodies(model, notes)
-    names = {i: model.body(i).name or f"body {i}" for i in poses}
+    root = _find_root(model, notes)
+    data = _place_bodies(model, root)
+    names = {i: model.body(i).name or f"body {i}" for i in np.flatnonzero(model.body_rootid == root).tolist()}
     if len(set(names.values())) < len(names):
         raise ValueError("two bodies have the same name")
-    root = min(poses)
     frames, turning, hinges = {}, [], dict[str, int]()
-    for i, pose in poses.items():
+    for i, name in names.items():
         hinge = None if i == root else _find_hinge(model, i)
         parent = None if i == root else names[int(model.body_parentid[i])]
-        origin = pose[:3, :3] @ (np.zeros(3) if hinge is None else model.jnt_pos[hinge]) + pose[:3, 3]
-        frames[names[i]] = LinkFrame(parent, hinge is not None, origin, _read_mass(model, i, pose))
+        mass = Mass(float(model.body_mass[i]), np.zeros(3), np.diag(model.body_inertia[i]))
+        mass = mass.turn(data.ximat[i].reshape(3, 3)).move(data.xipos[i])
+        origin = data.xpos[i] if hinge is None else data.xanchor[hinge]
+        frames[name] = LinkFrame(parent, hinge is not None, origin, mass)
         if hinge is not None:
-            turning.append(_read_turning(model, hinge, str(parent), names[i], pose))
-            hinges[names[i]] = hinge
+            turning.append(_read_turning(model, hinge, str(parent), name, data.xaxis[hinge]))
+            hinges[name] = hinge
     carriers = list_carriers(frames)
     unusable = {
         body: "has no actuator: it is not driven, and closed chains are not supported; add its motor"
@@ -65,11 +67,11 @@ def read_mjcf(path: str) -> RobotParts:
         bodies = [names[body] for body in _list_coupled_bodies(model, equality, kind) if body in names]
         unusable |= {carriers[body]: coupled for body in bodies}
     notes += _list_ignored(model)
-    read_shapes = partial(_read_foot_shapes, model, poses, names, frames)
+    read_shapes = partial(_read_foot_shapes, model, data, names, frames)
     return join_frames(Path(path).stem, frames, turning, read_shapes, notes, unusable)
 
 
-def _read_turning(model: Any, hinge: int, parent: str, child: str, pose: Array) -> Joint:
+def _read_turning(model: Any, hinge: int, parent: str, child: str, axis: Array) -> Joint:
     low, high = model.jnt_range[hinge] - model.qpos0[model.jnt_qposadr[hinge]]
     rate = model.jnt_dofadr[hinge]
     return Joint(
@@ -77,7 +79,7 @@ def _read_turning(model: Any, hinge: int, parent: str, child: str, pose: Array) 
         parent=parent,
         child=child,
         origin_m=(0.0, 0.0, 0.0),  # ``join_frames`` places it
-        axis=make_unit_axis(to_vector(pose[:3, :3] @ model.jnt_axis[hinge])),
+        axis=make_unit_axis(to_vector(axis)),
         limits_rad=(float(low), float(high)) if model.jnt_limited[hinge] else (-math.pi, math.pi),
         velocity_limit_rad_s=math.inf,  # MJCF has none
         torque_limit_Nm=_find_torque_limit(model, hinge),
@@ -120,16 +122,17 @@ def _list_ignored(model: Any) -> list[str]:
 
 
 def _read_foot_shapes(
-    model: Any, poses: Mapping[int, Array], names: Mapping[int, str], frames: Mapping[str, LinkFrame], foot: str
+    model: Any, data: Any, names: Mapping[int, str], frames: Mapping[str, LinkFrame], foot: str
 ) -> FootShapes:
     """Return the points of all shapes that move with a link, as for a URDF; MuJoCo has read the meshes."""
     carriers = list_carriers(frames)
     points = {kind: [np.zeros((0, 3))] for kind in ("collision", "visual")}
     others = []
-    for i in (i for i in poses if carriers[names[i]] == foot):
+    for i in (i for i, name in names.items() if carriers[name] == foot):
         for geom in range(model.body_geomadr[i], model.body_geomadr[i] + model.body_geomnum[i]):
             kind = "collision" if model.geom_contype[geom] or model.geom_conaffinity[geom] else "visual"
-            pose = poses[i] @ _make_pose(model.geom_pos[geom], model.geom_quat[geom])
+            pose = np.eye(4)
+            pose[:3, :3], pose[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
             shape, listed = _list_shape_points(model, geom, pose)
             points[kind].append(listed - frames[foot].origin_m)
             others += [] if len(listed) else [shape]
@@ -195,8 +198,8 @@ def _convert(path: str, error: Exception) -> RobotDataError:
     return RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}{remedy}")
 
 
-def _place_bodies(model: Any, notes: list[str]) -> dict[int, Array]:
-    """Return the poses (4, 4) of the bodies of the heaviest tree with hinges in the frame of its root, which is the first one."""
+def _find_root(model: Any, notes: list[str]) -> int:
+    """Return the root of the heaviest tree of bodies with hinges."""
     tops = {i: float(model.body_subtreemass[i]) for i in range(1, model.nbody) if model.body_parentid[i] == 0}
     if not tops:
         raise ValueError("it contains no body")
@@ -210,11 +213,19 @@ def _place_bodies(model: Any, notes: list[str]) -> dict[int, Array]:
         )
     if others := [f"{model.body(i).name!r} ({tops[i]:.3g} kg)" for i in tops if i != root]:
         notes.append(f"read: the tree of {model.body(root).name!r} ({tops[root]:.3g} kg); ignored: {', '.join(others)}")
-    poses: dict[int, Array] = {root: np.eye(4)}
-    for i in range(root + 1, model.nbody):
-        if (parent := int(model.body_parentid[i])) in poses:
-            poses[i] = poses[parent] @ _make_pose(model.body_pos[i], model.body_quat[i])
-    return poses
+    return root
+
+
+def _place_bodies(model: Any, root: int) -> Any:
+    """Return MuJoCo's data at zero angles, with the frame of a root in place of the world's."""
+    mujoco, upright = import_module("mujoco"), (1.0, 0.0, 0.0, 0.0)
+    model.body_pos[root], model.body_quat[root] = 0.0, upright
+    data = mujoco.MjData(model)
+    for joint in range(model.body_jntadr[root], model.body_jntadr[root] + model.body_jntnum[root]):
+        if model.jnt_type[joint] == JOINT_FREE:
+            data.qpos[model.jnt_qposadr[joint] :][:7] = 0.0, 0.0, 0.0, *upright
+    mujoco.mj_kinematics(model, data)
+    return data
 
 
 def _find_hinge(model: Any, body: int) -> int | None:
@@ -225,12 +236,6 @@ def _find_hinge(model: Any, body: int) -> int | None:
         name = model.body(body).name
         raise ValueError(f"body {name!r} has {len(hinges)} hinges; give each its own body with a small mass")
     return hinges[0] if hinges else None
-
-
-def _read_mass(model: Any, body: int, frame: Array) -> Mass:
-    pose = frame @ _make_pose(model.body_ipos[body], model.body_iquat[body])
-    mass = Mass(float(model.body_mass[body]), np.zeros(3), np.diag(model.body_inertia[body]))
-    return mass.turn(pose[:3, :3]).move(pose[:3, 3])
 
 
 def _find_torque_limit(model: Any, joint: int) -> float:
@@ -261,10 +266,3 @@ def _list_shape_points(model: Any, geom: int, pose: Array) -> tuple[str, Array]:
     else:
         points = list_shape_points(kind, model.geom_size[geom], pose)
     return kind, points if are_plausible(points) else np.zeros((0, 3))
-
-
-def _make_pose(place: Array, quaternion: Array) -> Array:
-    rotation, pose = np.zeros(9), np.eye(4)
-    import_module("mujoco").mju_quat2Mat(rotation, quaternion)
-    pose[:3, :3], pose[:3, 3] = rotation.reshape(3, 3), place
-    return pose

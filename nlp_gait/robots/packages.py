@@ -1,6 +1,5 @@
 """Robots of installed packages: ``PACKAGE:NAME`` is a URDF or MJCF file among the package's own, or one that it fetches."""
 
-import difflib
 import os
 import pkgutil
 import re
@@ -39,11 +38,8 @@ def find_robot_file(name: str) -> str:
     try:
         robots = FINDERS.get(package, _list_files)(package)
     except PackageNotFoundError:
-        near = difflib.get_close_matches(package, (*SHORT_NAMES, *KNOWN), n=1, cutoff=0.7)
-        meant = SHORT_NAMES.get(near[0], near[0]) if near else package
-        hint = "" if meant == package else f" (did you mean {meant!r}?)"
         raise RobotDataError(
-            f"robot {name!r}: the package {package!r} is not installed{hint}; install it with pip install {meant}, or give a file"
+            f"robot {name!r}: the package {package!r} is not installed; install it with pip install {package}, or give a file"
         ) from None
     if robot not in robots:
         raise unknown(f"robot of {package!r}", robot, robots)
@@ -114,13 +110,3 @@ FINDERS: Mapping[str, Callable[[str], Mapping[str, Locate]]] = {
     "mujoco-menagerie": _list_menagerie,
     "robot-descriptions": _list_descriptions,
 }
-# With humanoids, as far as we know; any other installed package serves, too.
-KNOWN = (
-    *FINDERS,
-    "armar",
-    "example-robot-data",
-    "fourier-robot-descriptions",
-    "icub-models",
-    "jvrc-description",
-    "mjlab",
-)

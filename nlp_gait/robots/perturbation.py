@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.robots.packages import MODEL_ENDINGS
-from nlp_gait.robots.robot import Foot, Robot
+from nlp_gait.robots.robot import Robot
 
 MARK = "@"
 MASS = "mass"
@@ -78,7 +78,10 @@ def _change(robot: Robot, name: str, value: float) -> Robot:
     if name in LENGTHS:
         return _with_length(robot, LENGTHS[name], value)
     if name in SOLES:
-        feet = {side: _with_sole(foot, SOLES[name], value) for side, foot in robot.feet.items()}
+        feet = {
+            side: replace(foot, **{key: getattr(foot, key) + share * value for key, share in SOLES[name].items()})
+            for side, foot in robot.feet.items()
+        }
         return replace(robot, feet=feet)
     changed = [link for link in robot.links if name in (MASS, f"{link}.{MASS}")]
     if not changed:
@@ -111,19 +114,3 @@ def _with_length(robot: Robot, above_foot: int, metres: float) -> Robot:
         x, y, z = (value * (1.0 + metres / length) for value in origin)
         joints[name] = replace(joints[name], origin_m=(x, y, z))
     return replace(robot, joints=joints)
-
-
-def _with_sole(foot: Foot, shares: Mapping[str, int], metres: float) -> Foot:
-    """Return a foot with other extents; its true outline is shifted, or stretched on the side whose extent changes."""
-    extents = {name: getattr(foot, name) + share * metres for name, share in shares.items()}
-
-    def move(value: float, positive: str, negative: str) -> float:
-        if positive in shares and negative in shares:
-            return value + shares[positive] * metres
-        extent = positive if value > 0.0 else negative
-        if extent not in shares or value == 0.0:
-            return value
-        return value * (1.0 + shares[extent] * metres / getattr(foot, extent))
-
-    outline = tuple((move(x, "front_m", "back_m"), move(y, "left_m", "right_m")) for x, y in foot.sole_polygon_m)
-    return replace(foot, **extents, sole_polygon_m=outline)

@@ -1,7 +1,7 @@
 """Frozen, validated data of a legged robot: links, joints, motors, feet."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import RobotDataError, unknown
+from nlp_gait.files import convert_errors
 
 Vector = tuple[float, float, float]
 
@@ -174,6 +175,30 @@ class Joint:
                 raise RobotDataError(f"{owner}: {name} must be ordered (lower < upper), got [{low}, {high}]")
 
 
+def rank_joints(links: Collection[str], joints: Sequence[Any]) -> tuple[str, list[Any]]:
+    """Return the root of links, and the joints (of any kind) from there outwards; raises ValueError unless they are a tree."""
+    children = set[str]()
+    for joint in joints:
+        for end in (joint.parent, joint.child):
+            if end not in links:
+                raise ValueError(f"joint {joint.name!r}: link {end!r} does not exist")
+        if joint.child in children:
+            raise ValueError(f"joint {joint.name!r}: link {joint.child!r} already has a parent")
+        children.add(joint.child)
+    roots = [name for name in links if name not in children]
+    if len(roots) != 1:
+        raise ValueError(f"exactly one link must have no parent, got {', '.join(roots) or 'none'}")
+    reached, ordered, waiting = {roots[0]}, list[Any](), joints
+    while waiting:
+        ready = [joint for joint in waiting if joint.parent in reached]
+        if not ready:
+            raise ValueError(f"joint {waiting[0].name!r} is part of a ring of joints")
+        ordered += ready
+        reached.update(joint.child for joint in ready)
+        waiting = [joint for joint in waiting if joint.child not in reached]
+    return roots[0], ordered
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Foot:
     """Flat sole under an ankle; distances are from the ankle's projection on the ground."""
@@ -184,8 +209,6 @@ class Foot:
     back_m: float
     left_m: float
     right_m: float
-    #: true outline of the sole, (x, y) from the ankle [m], in order
-    sole_polygon_m: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
         owner = f"foot {self.link!r}"
@@ -219,21 +242,10 @@ class Robot:
         pieces: tuple[Link | Joint, ...] = (*self.links.values(), *self.joints.values())
         for piece in pieces:
             piece.check()
-        if self.root not in self.links:
-            raise RobotDataError(f"robot {self.name!r}: root {self.root!r} is not a link")
-        children: set[str] = set()
-        for joint in self.joints.values():
-            for end in (joint.parent, joint.child):
-                if end not in self.links:
-                    raise RobotDataError(f"joint {joint.name!r}: link {end!r} does not exist")
-            if joint.child in children or joint.child == self.root:
-                raise RobotDataError(f"joint {joint.name!r}: link {joint.child!r} already has a parent or is the root")
-            children.add(joint.child)
-        loose = set(self.links) - children - {self.root}
-        if loose:
-            raise RobotDataError(f"robot {self.name!r}: no joint carries link {', '.join(sorted(loose))}")
-        for link in self.links:  # raises for a ring of joints apart from the root
-            self.path_to_root(link)
+        with convert_errors(f"robot {self.name!r}", RobotDataError):
+            root, _ = rank_joints(self.links, list(self.joints.values()))
+        if root != self.root:
+            raise RobotDataError(f"robot {self.name!r}: root {self.root!r} is not the link without a parent, {root!r}")
         for side in ("left", "right"):
             if side not in self.feet or self.feet[side].link not in self.links:
                 raise RobotDataError(f"robot {self.name!r}: foot {side!r} is missing or names no link")
@@ -267,8 +279,6 @@ class Robot:
         path: list[Joint] = []
         below = link
         while below != self.root:
-            if len(path) > len(self.joints):
-                raise RobotDataError(f"robot {self.name!r}: joints above link {link!r} form a ring")
             path.append(self.joint_to[below])
             below = path[-1].parent
         return tuple(path)

@@ -242,13 +242,6 @@ def to_vector(values: np.ndarray) -> Vector:
     return x, y, z
 
 
-def reverse_joint(joint: Joint) -> Joint:
-    """Return the joint with its angle counted in the opposite direction."""
-    (low, high), (plan_low, plan_high) = joint.limits_rad, joint.planning_limits_rad
-    x, y, z = joint.axis
-    return replace(joint, axis=(-x, -y, -z), limits_rad=(-high, -low), planning_limits_rad=(-plan_high, -plan_low))
-
-
 def make_point_masses(robot: Robot) -> Robot:
     """Return the robot with every link's inertia about its centre of mass set to zero."""
     links = {name: replace(link, inertia_com_kgm2=(0.0,) * 6) for name, link in robot.links.items()}

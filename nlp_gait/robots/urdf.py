@@ -21,7 +21,7 @@ from nlp_gait.robots.meshes import (
     read_model,
     remove_namespace,
 )
-from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
+from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis, rank_joints
 from nlp_gait.robots.tree import Array, Mass, compute_point_inertia, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
@@ -216,25 +216,10 @@ def _place_links(robot: Any, names: list[str], joints: list[UrdfJoint]) -> dict[
         listed = [element.get("name") for element in robot.findall(kind)]
         if duplicates := sorted({name for name in listed if listed.count(name) > 1}):
             raise ValueError(f"{kind} {duplicates[0]!r} appears twice")
-    children = set[str]()
-    for joint in joints:
-        for end in (joint.parent, joint.child):
-            if end not in names:
-                raise ValueError(f"joint {joint.name!r}: link {end!r} does not exist")
-        if joint.child in children:
-            raise ValueError(f"joint {joint.name!r}: link {joint.child!r} already has a parent")
-        children.add(joint.child)
-    roots = [name for name in names if name not in children]
-    if len(roots) != 1:
-        raise ValueError(f"exactly one link must have no parent, got {', '.join(roots) or 'none'}")
-    poses: dict[str, Array] = {roots[0]: np.eye(4)}
-    waiting = joints
-    while waiting:
-        ready = [joint for joint in waiting if joint.parent in poses]
-        if not ready:
-            raise ValueError(f"joint {waiting[0].name!r} is part of a ring of joints")
-        poses |= {joint.child: poses[joint.parent] @ _read_pose(joint.element) for joint in ready}
-        waiting = [joint for joint in waiting if joint.child not in poses]
+    root, ordered = rank_joints(names, joints)
+    poses: dict[str, Array] = {root: np.eye(4)}
+    for joint in ordered:
+        poses[joint.child] = poses[joint.parent] @ _read_pose(joint.element)
     return poses
 
 

@@ -47,15 +47,6 @@ class Power:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Landing:
-    """Final and planned place of a swinging sole; (x, y) under the ankle [m]."""
-
-    planned_m: tuple[float, float]
-    measured_m: tuple[float, float]
-    error_m: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Touchdown:
     """First contact of a swinging foot that lasts 3 ms, in the second half of its swing."""
 
@@ -77,7 +68,7 @@ class Measurements:
     tracking_max_rad: float  #: largest
     #: largest distance of a supporting sole from its place at the begin of its support, until a step at rest
     slip_m: float
-    landings: Mapping[str, Landing]  #: by side, of the swinging feet
+    landing_errors_m: Mapping[str, float]  #: by side, from the final to the planned place of the swinging sole
     #: distance of the centre of pressure, averaged over one set-point period, from the planned ZMP
     pressure_rms_m: float | None
     pressure_middle_rms_m: float | None  #: over the middle 60 % of the phase
@@ -95,7 +86,7 @@ class Measurements:
 
 def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
     """Compute the numbers of a simulation."""
-    during = simulation.plan_t <= plan.duration_s
+    during, end = simulation.plan_t <= plan.duration_s, np.array([plan.duration_s])
     error = plan.at("q", simulation.plan_t[during]) - simulation.q[during]
     torque = simulation.torque[during]
     joints = [plan.robot.joint(name) for name in plan.joints]
@@ -115,7 +106,11 @@ def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
         tracking_rms_rad=_compute_rms(error),
         tracking_max_rad=float(np.abs(error).max()),
         slip_m=_measure_slip(plan, simulation),
-        landings={side: _measure_landing(plan, simulation, side) for side in SIDES if side not in plan.supports},
+        landing_errors_m={
+            side: float(np.linalg.norm(simulation.feet[-1, i, :2] - plan.at(f"{side}_foot", end)[0, :2]))
+            for i, side in enumerate(SIDES)
+            if side not in plan.supports
+        },
         pressure_rms_m=_rms_if_any(deviation),
         pressure_middle_rms_m=_rms_if_any(middle),
         touchdowns=touchdowns,
@@ -182,13 +177,6 @@ def _find_touchdowns(plan: Plan, simulation: Simulation) -> tuple[Touchdown, ...
                 times = {"planned_s": float(simulation.t[planned]), "measured_s": float(simulation.t[first])}
                 touchdowns.append(Touchdown(side=side, **times, speed_m_s=speed))
     return tuple(sorted(touchdowns, key=lambda touchdown: touchdown.planned_s))
-
-
-def _measure_landing(plan: Plan, simulation: Simulation, side: str) -> Landing:
-    planned = plan.at(f"{side}_foot", np.array([plan.duration_s]))[0, :2].tolist()
-    measured = simulation.feet[-1, SIDES.index(side), :2].tolist()
-    error = float(np.linalg.norm(np.subtract(measured, planned)))
-    return Landing(planned_m=tuple(planned), measured_m=tuple(measured), error_m=error)
 
 
 def _select_joints(plan: Plan, shares: Array, above: float) -> dict[str, float]:

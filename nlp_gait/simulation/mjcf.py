@@ -52,13 +52,12 @@ TILE, TILE_MARGIN = 0.15, 0.5  # side of a tile, and ground around the planned s
 def make_plan_model(
     plan: Plan,
     drive: Drive,
-    sole: str = "rectangle",
     friction: float = FRICTION,
     bumps: Bumps | None = None,
     sensors: Iterable[Xml.Element] = (),
 ) -> str:
     """Return the model of a plan's robot with position drives on its ground, which all shapes can touch."""
-    robot, shapes = plan.robot, make_plan_shapes(plan, sole)
+    robot, shapes = plan.robot, make_plan_shapes(plan)
     root = Xml.fromstring(files("nlp_gait.simulation").joinpath("world.xml").read_text(encoding="utf-8"))
     _, option, default, _, assets, world, actuators = root
     root.set("model", robot.name)
@@ -100,10 +99,10 @@ def make_plan_model(
     return Xml.tostring(root, encoding="unicode") + "\n"
 
 
-def make_plan_shapes(plan: Plan, sole: str) -> dict[str, list[Shape]]:
+def make_plan_shapes(plan: Plan) -> dict[str, list[Shape]]:
     """Return the shapes of a plan's robot by link; those of welded joints are parts of the parents."""
     welded = [joint for joint in plan.full_robot.joints if joint not in plan.robot.joints]
-    return make_shapes(plan.full_robot, sole, welded)
+    return make_shapes(plan.full_robot, welded)
 
 
 def _add_bumps(world: Xml.Element, plan: Plan, bumps: Bumps) -> None:

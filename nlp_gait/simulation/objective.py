@@ -59,7 +59,7 @@ class Arena:
         self._steps, self._settle_s = steps, settle_s
         point = Result(problem=problem, x=problem.start_point(np.random.default_rng(0)))
         plan = make_plan(point, None if steps is None else steps + MORE_STEPS)
-        self._model = prepare(plan, self._conditions, self._drive, "rectangle")[0]
+        self._model = prepare(plan, self._conditions, self._drive)[0]
 
     def simulate(self, x: Array) -> tuple[Plan, Simulation, Walk]:
         """Return the plan of a candidate (n,), its simulation, and both in numbers; raises GaitError if it has no motion."""

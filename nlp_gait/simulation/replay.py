@@ -35,7 +35,7 @@ def list_frames(simulation: Simulation) -> Indices:
     return np.arange(0, len(simulation.t), round(1.0 / (FRAMES_PER_S * TIME_STEP)))
 
 
-def make_skeleton(plan: Plan, simulation: Simulation, model: Any, sole: str, title: str) -> Skeleton:
+def make_skeleton(plan: Plan, simulation: Simulation, model: Any, title: str) -> Skeleton:
     """Return the simulated robot, by the engine's model, with its centre of mass and the measured centre of pressure."""
     engine, steps = load_mujoco(), list_frames(simulation)
     data = engine.MjData(model)
@@ -50,7 +50,7 @@ def make_skeleton(plan: Plan, simulation: Simulation, model: Any, sole: str, tit
     x, rotation = np.array(places), np.array(turns)
     sides, limbs, soles = find_sides(plan.robot), list[Limb](), list[Sole]()
     loaded = simulation.loads[steps] > LEAST_LOAD
-    for link, shapes in make_plan_shapes(plan, sole).items():
+    for link, shapes in make_plan_shapes(plan).items():
         body, side = model.body(link).id, sides.get(link, TRUNK)
         for shape in shapes:
             if isinstance(shape, Capsule):

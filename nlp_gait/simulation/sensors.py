@@ -13,6 +13,7 @@ from nlp_gait.simulation.plan import SIDES, Plan
 
 MOST_CONTACTS, MOST_OF_FOOT = 128, 64  # points of contact that are measured, of the robot and of a foot's link
 CONTACT_VALUES = 10  # of a point: whether it is one, its force in its own axes, place, and normal
+HEIGHT, UPWARD = 8, slice(12, 15)  # columns of the torso's height and of its upward axis
 STEEP = 0.7  # vertical part of a contact's normal, below which it is with a riser
 
 
@@ -21,8 +22,7 @@ class Readings(NamedTuple):
 
     feet: Array  # (T, 2, 3) soles under the ankles [m]
     torso: Array  # (T, 3) its origin [m]
-    forward: Array  # (T, 3) its axes
-    upward: Array  # (T, 3)
+    forward: Array  # (T, 3) its axis
     torque: Array  # (T, J) of the drives [Nm]
     loads: Array  # (T, 2) normal forces on both feet, from all contacts with the ground [N]
     risers: Array  # (T, 2) of these, normal forces of steep faces [N]
@@ -46,7 +46,7 @@ def read_sensors(plan: Plan, values: Any) -> Readings:
     """Return the values (T, S) of all sensors by quantity; raises InputError where more contacts touch than are measured."""
     count, joints, feet = len(values), len(plan.joints), list(_list_feet(plan))
     sizes = (6, 3, 3, 3, joints, MOST_CONTACTS * CONTACT_VALUES, *[MOST_OF_FOOT * CONTACT_VALUES] * len(feet))
-    soles, torso, forward, upward, torque, *contacts = np.split(values, np.cumsum(sizes)[:-1], axis=1)
+    soles, torso, forward, _, torque, *contacts = np.split(values, np.cumsum(sizes)[:-1], axis=1)
     contacts = [touching.reshape(count, -1, CONTACT_VALUES) for touching in contacts]
     if any((touching[:, 0, 0] > touching.shape[1]).any() for touching in contacts):
         raise InputError(f"the robot touches the ground at more than {MOST_CONTACTS} points; use larger or fewer bumps")
@@ -60,7 +60,7 @@ def read_sensors(plan: Plan, values: Any) -> Readings:
     with np.errstate(invalid="ignore", divide="ignore"):
         centre = np.einsum("tc,tcx->tx", forces, places) / total
     pressure = np.where(total > LEAST_LOAD, centre, np.nan)
-    return Readings(soles.reshape(count, 2, 3), torso, forward, upward, torque, loads, risers, pressure)
+    return Readings(soles.reshape(count, 2, 3), torso, forward, torque, loads, risers, pressure)
 
 
 def _list_feet(plan: Plan) -> Iterator[tuple[int, str]]:

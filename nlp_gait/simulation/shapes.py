@@ -6,12 +6,9 @@ from typing import Self, TypeAlias
 
 import numpy as np
 
-from nlp_gait.errors import InputError
-from nlp_gait.robots import Foot, Robot
+from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Vector
 from nlp_gait.robots.tree import add_vectors
-
-SOLES = ("rectangle", "polygon")  # the outline for balance margins, or the true one
 
 SOLE_THICKNESS = 0.015  # [m]; the sole's lower face alone touches the floor
 LIMB_RADIUS = 0.02  # [m]
@@ -49,7 +46,7 @@ class Prism:
 Shape: TypeAlias = Capsule | Prism
 
 
-def make_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] = ()) -> dict[str, list[Shape]]:
+def make_shapes(robot: Robot, welded: Collection[str] = ()) -> dict[str, list[Shape]]:
     """Return capsules, a ball for a head and prisms for soles by link, in link axes; welded joints' move to the parents.
 
     A limb that ends near the ground is shorter by twice its radius, so that the sole touches first.
@@ -68,7 +65,8 @@ def make_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] =
     for name, link in robot.links.items():
         if name in robot.soles:
             foot = robot.soles[name]
-            outline = get_sole_outline(foot, sole)
+            front, back, left, right = foot.front_m, -foot.back_m, foot.left_m, -foot.right_m
+            outline = ((front, left), (back, left), (back, right), (front, right))
             shapes[name].append(Prism(outline=outline, bottom=-foot.ankle_height_m, thickness=SOLE_THICKNESS))
         elif name == robot.root and not shapes[name]:  # all limbs start at one point of the trunk: a rod from there
             x, y, z = link.com_m
@@ -92,15 +90,3 @@ def _find_low_joints(robot: Robot) -> set[str]:
             if np.linalg.norm(joint.origin_m) >= SHORTEST_LIMB:
                 break
     return low
-
-
-def get_sole_outline(foot: Foot, sole: str) -> tuple[tuple[float, float], ...]:
-    """Return the corners of a sole from the ankle's projection on the ground [m]; raises InputError for an unknown outline."""
-    if sole not in SOLES:
-        raise InputError(f"sole must be one of {', '.join(SOLES)}, got {sole!r}")
-    if sole == "rectangle":
-        front, back, left, right = foot.front_m, -foot.back_m, foot.left_m, -foot.right_m
-        return ((front, left), (back, left), (back, right), (front, right))
-    if not foot.sole_polygon_m:
-        raise InputError(f"foot {foot.link!r} has no sole_polygon_m in the robot's data; use --sole rectangle")
-    return foot.sole_polygon_m

@@ -13,7 +13,7 @@ from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import Addresses, check_range, load_mujoco, place_root
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, Bumps, make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
-from nlp_gait.simulation.sensors import list_sensors, read_sensors
+from nlp_gait.simulation.sensors import HEIGHT, UPWARD, list_sensors, read_sensors
 
 CHUNK = 200  # steps of the engine without a look at the robot
 LONGEST_WALK = 3  # simulated times the planned duration, where feedback delays the plan
@@ -113,7 +113,6 @@ class SimulationRun:
         plan: Plan,
         conditions: Conditions | None = None,
         drive: Drive | None = None,
-        sole: str = "rectangle",
         settle_s: float = SETTLE_TIME,
         model: Any = None,
     ) -> None:
@@ -125,14 +124,15 @@ class SimulationRun:
             raise InputError(
                 f"a push must begin from 0 s to the end of the simulation, {end_s:.4g} s, got {push.start_s:g} s"
             )
-        self.model, self.data = prepare(plan, self._conditions, drive, sole, model)
+        self.model, self.data = prepare(plan, self._conditions, drive, model)
         self._addresses = Addresses(self.model, plan)
         steps = round((plan.duration_s + settle_s) / TIME_STEP)
         times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
         self._commands = drive.set_points(plan.at, times, [plan.robot.joint(name) for name in plan.joints])
         heights, self._axes = plan.at("hip", times)[:, 2], plan.torso_axis(times)
         self._least_heights = heights - (1.0 - FALLEN_HEIGHT) * heights[0]
-        self._corrector = drive.make_corrector(plan, lambda: prepare(plan, Conditions(), drive, sole)[0])
+        self._corrector = drive.make_corrector(plan, lambda: prepare(plan, Conditions(), drive)[0])
+        self._latest: list[dict[str, Array]] = []  # whose sensors are not read yet
         self._parts: list[dict[str, Array]] = []
         self._step = 0
         self.fell_at_s: float | None = None
@@ -190,28 +190,40 @@ class SimulationRun:
         )
         # A step leaves positions, forces and contacts of the instant at which it began
         before = np.concatenate([state[None], states[0, :-1]])
-        readings = read_sensors(self.plan, sensors[0])
         k = np.rint(plan_times / TIME_STEP).astype(int)
-        upright = np.einsum("ti,ti->t", readings.upward, self._axes[k])
+        upright = np.einsum("ti,ti->t", sensors[0, :, UPWARD], self._axes[k])
         diverged = ~np.isfinite(states[0]).all(axis=1) | (np.abs(states[0, :, 0] - times - TIME_STEP) > TIME_STEP / 2)
-        fallen = diverged | (upright < math.cos(FALLEN_TILT)) | (readings.torso[:, 2] < self._least_heights[k])
+        fallen = diverged | (upright < math.cos(FALLEN_TILT)) | (sensors[0, :, HEIGHT] < self._least_heights[k])
         if fallen.any():
             count = int(fallen.argmax()) + 1
             self.fell_at_s = float(times[count - 1])
-        positions, velocities = np.split(before[:, 1 : 1 + model.nq + model.nv], [model.nq], axis=1)
         part = {
             "t": times,
             "plan_t": plan_times,
-            "states": positions,
-            "q": positions[:, addresses.angles],
-            "qd": velocities[:, addresses.rates],
             "set_points": commands,
             "tilt": np.arccos(np.clip(upright, -1.0, 1.0)),
+            "states": before,
+            "sensors": sensors[0],
+        }
+        self._latest.append({name: values[:count] for name, values in part.items()})
+        self._step += count
+        if sum(len(part["t"]) for part in self._latest) >= CHUNK:
+            self._record()
+
+    def _record(self) -> None:
+        """Read the sensors of the latest steps."""
+        part = {name: np.concatenate([latest[name] for latest in self._latest]) for name in self._latest[0]}
+        self._latest = []
+        readings, model = read_sensors(self.plan, part.pop("sensors")), self.model
+        positions, velocities = np.split(part["states"][:, 1 : 1 + model.nq + model.nv], [model.nq], axis=1)
+        measured = {
+            "states": positions,
+            "q": positions[:, self._addresses.angles],
+            "qd": velocities[:, self._addresses.rates],
             "heading": np.arctan2(readings.forward[:, 1], readings.forward[:, 0]),
             **{name: getattr(readings, name) for name in ("torque", "torso", "feet", "loads", "risers", "pressure")},
         }
-        self._parts.append({name: values[:count] for name, values in part.items()})
-        self._step += count
+        self._parts.append(part | measured)
 
     def push(self, push: Push) -> None:
         """Push the robot from now on by this push instead of an earlier one."""
@@ -220,7 +232,7 @@ class SimulationRun:
     def fork(self, push: Push) -> "SimulationRun":
         """Return a copy that is pushed; its trace begins here."""
         other = copy.copy(self)
-        other.data, other._parts = copy.copy(self.data), []
+        other.data, other._latest, other._parts = copy.copy(self.data), [], []
         other._corrector = None if self._corrector is None else self._corrector.fork()
         other.push(push)
         return other
@@ -228,26 +240,23 @@ class SimulationRun:
     def finish(self) -> Simulation:
         """Simulate to the end and return the measurements."""
         self.advance()
+        if self._latest:
+            self._record()
         measured = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
         stepped_at_s = None if self._corrector is None else self._corrector.stepped_at_s
         return Simulation(**measured, fell_at_s=self.fell_at_s, stepped_at_s=stepped_at_s)
 
 
-def simulate_plan(
-    plan: Plan,
-    conditions: Conditions | None = None,
-    drive: Drive | None = None,
-    sole: str = "rectangle",
-) -> Simulation:
+def simulate_plan(plan: Plan, conditions: Conditions | None = None, drive: Drive | None = None) -> Simulation:
     """Simulate a gait from its planned state until it has settled or fallen, deterministically; raises MissingExtraError."""
-    return SimulationRun(plan, conditions, drive, sole).finish()
+    return SimulationRun(plan, conditions, drive).finish()
 
 
-def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str, model: Any = None) -> tuple[Any, Any]:
+def prepare(plan: Plan, conditions: Conditions, drive: Drive, model: Any = None) -> tuple[Any, Any]:
     """Return the engine's model, or that of an earlier call, and its data, with the robot in its planned state at time zero."""
     engine = load_mujoco()
     if model is None:
-        xml = make_plan_model(plan, drive, sole, conditions.friction, conditions.bumps, list_sensors(plan))
+        xml = make_plan_model(plan, drive, conditions.friction, conditions.bumps, list_sensors(plan))
         model = engine.MjModel.from_xml_string(xml)
         model.body_mass *= conditions.mass_factor
         model.body_inertia *= conditions.mass_factor

@@ -46,7 +46,7 @@ def larger(factor: float) -> Record:
     for joint in raw["joints"].values():
         joint["origin_m"] = [factor * c for c in joint["origin_m"]]
     for foot in raw["feet"].values():
-        foot |= {key: factor * value for key, value in foot.items() if key.endswith("_m") and key != "sole_polygon_m"}
+        foot |= {key: factor * value for key, value in foot.items() if key.endswith("_m")}
     return raw
 
 

@@ -61,8 +61,7 @@ def test_mjcf_files_are_robots_and_scenes_and_other_xml_files_are_not(packages: 
     ("name", "package"),
     [
         ("no-robots:one", "no-robots"),
-        ("jvrc-descripton:jvrc1", "jvrc-description"),
-        ("menagery:g1", "mujoco-menagerie"),
+        ("menagerie:g1", "mujoco-menagerie"),
     ],
 )
 def test_a_missing_package_is_named_with_the_command_that_installs_it(name: str, package: str) -> None:

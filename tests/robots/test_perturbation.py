@@ -39,11 +39,6 @@ def test_a_shifted_sole_keeps_its_size_and_shape() -> None:
         other = shifted.feet[side]
         assert other.front_m + other.back_m == pytest.approx(foot.front_m + foot.back_m)
         assert (other.front_m, other.left_m) == pytest.approx((foot.front_m + 0.002, foot.left_m - 0.001))
-        moves = {
-            (round(a - c, 9), round(b - d, 9))
-            for (a, b), (c, d) in zip(other.sole_polygon_m, foot.sole_polygon_m, strict=True)
-        }
-        assert moves == {(0.002, -0.001)}
 
 
 def test_a_name_carries_the_changes() -> None:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from nlp_gait.errors import GaitError, MissingExtraError, RobotDataError
+from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.urdf import read_urdf
 from tests.robots.custom import about_joints, as_urdf, assert_same, humanoid, nao, partner, written
@@ -81,19 +81,6 @@ def test_links_behind_joints_that_do_not_turn_become_one_with_those_before(tmp_p
     assert head.inertia_matrix[1, 1] == pytest.approx(before.inertia_matrix[1, 1] + between)
     assert robot.links["l_wrist"].mass_kg == pytest.approx(plain.links["l_wrist"].mass_kg + 0.1)
     assert robot.links["base_link"].com_m == pytest.approx(plain.links["torso"].com_m)
-
-
-def test_joints_get_the_names_of_nao_and_may_be_reversed(tmp_path: Path) -> None:
-    raw = nao()
-    renamed = {f"joint_{i}": joint for i, joint in enumerate(raw["joints"].values())}
-    names = dict(zip(raw["joints"], renamed, strict=True))
-    knee = renamed[names["LKneePitch"]]
-    low, high = knee["limits_rad"]
-    knee["axis"], knee["limits_rad"] = [0.0, -1.0, 0.0], [-high, -low]
-    names["LKneePitch"] = f"-{names['LKneePitch']}"
-    raw["joints"] = renamed
-    mine = load_robot(stored(tmp_path, as_urdf(raw), partner(nao(), "robot.urdf", joint_names=names)))
-    assert_same(mine, load_robot("nao-v5"))
 
 
 def test_wheels_and_missing_axes_get_the_defaults_of_the_format(tmp_path: Path) -> None:
@@ -186,18 +173,6 @@ def test_the_robot_file_next_to_a_urdf_must_extend_it(tmp_path: Path) -> None:
     path = stored(tmp_path, as_urdf(nao()), partner(nao(), "other.urdf"))
     with pytest.raises(RobotDataError, match=r"robot\.json': 'extends' must be 'robot\.urdf', the file next to it"):
         load_robot(path)
-
-
-@pytest.mark.parametrize(
-    ("names", "message"),
-    [
-        ({"LKneePitch": "left_knee"}, r"unknown joint in joint_names of .*robot\.json' 'left_knee'"),
-        ({"RKneePitch": "LKneePitch"}, "joint_names gives 'RKneePitch' to 'LKneePitch', but that name is taken"),
-    ],
-)
-def test_joint_names_that_fit_no_joint_are_refused(tmp_path: Path, names: object, message: str) -> None:
-    with pytest.raises(GaitError, match=message):
-        load_robot(stored(tmp_path, as_urdf(nao()), partner(nao(), "robot.urdf", joint_names=names)))
 
 
 def test_without_the_extra_its_name_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

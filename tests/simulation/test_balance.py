@@ -83,7 +83,7 @@ def find_torque_limits(plan: Plan) -> Array:
 
 def solve_instant(plan: Plan, share: float, mass: tuple[float, float, float], left_rolls: bool) -> tuple[Torques, Any]:
     """Return torques at a share of the plan's time and the engine's data; both have the same accelerations."""
-    model, data = prepare(plan, Conditions(), Drive(), "rectangle")
+    model, data = prepare(plan, Conditions(), Drive())
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     addresses, limits = Addresses(model, plan), find_torque_limits(plan)
     qp = WholeBodyQP(WalkReference(plan, model, limits), model, addresses, limits, friction=0.5)
@@ -137,7 +137,7 @@ def test_a_foot_that_rolls_is_held_at_the_tip_of_its_toe_where_no_moment_acts() 
 
 
 def test_a_wrench_is_allowed_just_where_forces_at_the_corners_of_a_sole_give_it(plan: Plan) -> None:
-    model, _ = prepare(plan, Conditions(), Drive(), "rectangle")
+    model, _ = prepare(plan, Conditions(), Drive())
     limits = find_torque_limits(plan)
     reference, friction = WalkReference(plan, model, limits), 0.5
     rows = WholeBodyQP(reference, model, Addresses(model, plan), limits, friction).cone
@@ -170,7 +170,7 @@ def standing(plan: Plan) -> Plan:
 
 @pytest.mark.parametrize("first", [0, 1])
 def test_steps_from_rest_move_the_mass_as_a_pendulum_and_end_where_they_begin(standing: Plan, first: int) -> None:
-    model, _ = prepare(standing, Conditions(), Drive(), "rectangle")
+    model, _ = prepare(standing, Conditions(), Drive())
     reference = WalkReference(standing, model, find_torque_limits(standing))
     steps = reference.make_steps_from_rest(first)
     assert [phase.swing for phase in steps.phases] == [None, first, None, 1 - first, None]

@@ -26,7 +26,6 @@ NAO = load_robot("nao-v5")
     [
         (lambda: Drive(torque_limits="peak"), "urdf, stall, continuous, got 'peak'"),
         (lambda: Conditions(friction=-1.0), "friction of a simulation must be from 1e-06 to 1e.06, got -1.0"),
-        (lambda: make_shapes(NAO, "oval"), "rectangle, polygon, got 'oval'"),
     ],
 )
 def test_bad_settings_are_refused(make, words):
@@ -34,11 +33,10 @@ def test_bad_settings_are_refused(make, words):
         make()
 
 
-def test_soles_are_the_papers_rectangle_or_the_true_outline():
-    rectangle, polygon = ((make_shapes(NAO, sole)["l_ankle"][-1]) for sole in ("rectangle", "polygon"))
+def test_soles_are_the_papers_rectangle():
+    rectangle = make_shapes(NAO)["l_ankle"][-1]
     assert isinstance(rectangle, Prism) and rectangle.bottom == -0.04519
     assert sorted(rectangle.outline) == [(-0.05, -0.04), (-0.05, 0.04), (0.1, -0.04), (0.1, 0.04)]
-    assert len(polygon.outline) == 20
 
 
 def test_shapes_of_a_welded_head_move_to_the_torso():

@@ -96,7 +96,7 @@ def test_a_lean_that_changes_gives_the_torso_a_spin() -> None:
 
 def test_gravity_is_compensated_by_the_torques_that_hold_the_posture_over_the_foremost_foot(climb: Result) -> None:
     plan, controller = make_plan(climb), JointController(kp=100.0, kd=10.0, gravity_compensation=0.5)
-    model, data = prepare(plan, Conditions(), Drive(controller=controller), "rectangle")
+    model, data = prepare(plan, Conditions(), Drive(controller=controller))
     compensation = GravityCompensation(controller, plan, model)
     links = climb.problem.signals(climb.x).arrays["link_q"][:1].T
     still, nothing = np.zeros((len(MOVING), 1)), np.zeros((2, 1))

@@ -17,7 +17,7 @@ from nlp_gait.simulation.simulate import Conditions, prepare, simulate_plan  # n
 @pytest.fixture(scope="module")
 def simulated(gait):
     plan = make_plan(gait("dsp optimum"))
-    model, _ = prepare(plan, Conditions(), Drive(), "rectangle")
+    model, _ = prepare(plan, Conditions(), Drive())
     return plan, simulate_plan(plan), model
 
 
@@ -31,7 +31,7 @@ def test_frames_are_equally_long_and_states_those_of_the_torso(simulated):
 
 
 def test_the_skeleton_is_where_the_engine_has_the_robot(simulated):
-    skeleton = make_skeleton(*simulated, "rectangle", "a title")
+    skeleton = make_skeleton(*simulated, "a title")
     feet = simulated[1].feet[list_frames(simulated[1])]  # soles under the ankles
     for i, side in enumerate(("left", "right")):
         (sole,) = (part for part in skeleton.soles if part.side == side)

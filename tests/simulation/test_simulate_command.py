@@ -41,7 +41,7 @@ def simulate(
 
 def count_shank_contacts(plan: Plan, trace: Simulation) -> int:
     """Return the contacts of shanks with the ground at every fifth millisecond of a simulation."""
-    model, data = prepare(plan, Conditions(), Drive(), "rectangle")
+    model, data = prepare(plan, Conditions(), Drive())
     shanks = [model.body(f"{side} shank").id for side in SIDES]
     contacts = 0
     for state in trace.states[::10]:
@@ -64,7 +64,7 @@ def test_the_planned_climb_is_climbed_with_the_planned_energy() -> None:
     assert not m.fallen and m.largest_tilt_deg < 2.0
     assert m.measured.mechanical_W == pytest.approx(m.predicted.mechanical_W, rel=0.05)
     assert m.pressure_middle_rms_m is not None and m.pressure_middle_rms_m < 0.004
-    assert m.landings["right"].error_m < 0.005
+    assert m.landing_errors_m["right"] < 0.005
     rise = 0.508 / 2 * 0.70
     heights = trace.feet[[0, -1], 1, 2]
     assert heights[0] == pytest.approx(0.0, abs=0.002)

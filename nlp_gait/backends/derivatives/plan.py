@@ -8,7 +8,6 @@ or calls a function of one sample for all pairs of a sample and a direction, as 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -253,6 +252,13 @@ class DerivativePlan:
 
 def find_runs(targets: Integers, sources: Integers) -> list[tuple[int, int, int]]:
     """Split two lists of places into runs in which both increase by one; return target, source, length of each."""
-    ends = np.flatnonzero((np.diff(targets) != 1) | (np.diff(sources) != 1)) + 1
-    cuts = [0, *ends.tolist(), len(targets)] if len(targets) else []
-    return [(int(targets[i]), int(sources[i]), j - i) for i, j in pairwise(cuts)]
+    runs: list[tuple[int, int, int]] = []
+    end = None
+    for place in zip(targets.tolist(), sources.tolist(), strict=True):
+        if place == end:
+            target, source, length = runs.pop()
+            runs.append((target, source, length + 1))
+        else:
+            runs.append((*place, 1))
+        end = place[0] + 1, place[1] + 1
+    return runs

@@ -59,7 +59,7 @@ def measure_leg(robot: Robot, side: str) -> LegGeometry:
         if math.dist(joint.axis, AXES[name]) > AXIS_TOLERANCE:
             raise InputError(
                 f"robot {robot.name!r}, joint {joint.name!r}: its axis must be {list(AXES[name])} (x forward, y left, z up, "
-                f"at zero angles), got {list(joint.axis)}; a joint of the opposite sense can be reversed, see joint_names"
+                f"at zero angles), got {list(joint.axis)}"
             )
     for joint, above in ((pitch, roll), (ankle_roll, ankle)):
         if math.hypot(*joint.origin_m) > ORIGIN_TOLERANCE_M:

@@ -2,6 +2,7 @@
 
 import copy
 import math
+from collections import deque
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Self
 
@@ -10,7 +11,6 @@ import numpy as np
 from nlp_gait.formulation import Array
 from nlp_gait.simulation.balance.footholds import Step, StepLimits, choose_step, clip_to_soles
 from nlp_gait.simulation.balance.reference import SupportPhase, WalkReference
-from nlp_gait.simulation.balance.sampler import Sampler
 from nlp_gait.simulation.balance.whole_body import Targets, WholeBodyQP
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import PERIODS_S, Addresses, check_range, load_mujoco, measure_loads
@@ -261,9 +261,9 @@ class WholeBodyBalance:
         ankles = [plan.joints.index(plan.robot.path_to_root(foot.link)[0].name) for foot in plan.robot.feet.values()]
         stiffest = float(self._stiffness[ankles].max())
         self._hold = min(1.0, settings.hold * stiffest / (reference.mass * plan.gravity * reference.height))
-        self._sampler = Sampler[RobotState](
-            settings.period_s, settings.delay_s, settings.seed, float(model.opt.timestep)
-        )
+        self._random, step_s = np.random.default_rng(settings.seed), float(model.opt.timestep)
+        self._every, self._late = max(1, round(settings.period_s / step_s)), round(settings.delay_s / step_s)
+        self._waiting: deque[tuple[int, RobotState]] = deque()  # measurements, and the steps at which they arrive
         deviations = [
             np.append(np.repeat(sizes[:2], 3)[plan.root_axes], np.full(len(joints), sizes[2]))
             for sizes in (NOISE, RATE_NOISE)
@@ -276,8 +276,8 @@ class WholeBodyBalance:
     def fork(self) -> Self:
         """Return a copy for a simulation that begins in the middle of this one."""
         other = copy.copy(self)
-        other._sampler, clock = self._sampler.fork(), copy.copy(self.clock)
-        other.clock = clock
+        other._random, other._waiting = copy.deepcopy(self._random), self._waiting.copy()
+        other.clock = clock = copy.copy(self.clock)
         clock.offsets, clock.goal, clock.origin = clock.offsets.copy(), clock.goal.copy(), clock.origin.copy()
         return other
 
@@ -287,13 +287,16 @@ class WholeBodyBalance:
 
     def correct(self, command: Array, data: Any, step: int) -> tuple[Array, int]:
         """Return the set-points (J,) [rad] instead of the planned ones, and for how many steps of the engine."""
-        state = self._sampler.sample(step, lambda: self._measure(data))
-        if state is not None:
-            self._command = self._update(state, step)
-        return command if self._command is None else self._command, self._sampler.wait(step)
+        if step % self._every == 0:
+            self._waiting.append((step + self._late, self._measure(data)))
+        if self._waiting and self._waiting[0][0] <= step:
+            self._command = self._update(self._waiting.popleft()[1], step)
+        arrival = self._waiting[0][0] if self._waiting else step + self._every
+        wait = min(arrival - step, self._every - step % self._every)
+        return command if self._command is None else self._command, wait
 
     def _measure(self, data: Any) -> RobotState:
-        positions, noise = data.qpos.copy(), self._noise * self._sampler.random.standard_normal(self._noise.shape)
+        positions, noise = data.qpos.copy(), self._noise * self._random.standard_normal(self._noise.shape)
         self._engine.mj_integratePos(self._model, positions, noise[0], 1.0)
         return RobotState(positions, data.qvel + noise[1], measure_loads(data, self._addresses))
 
@@ -436,7 +439,7 @@ class WholeBodyBalance:
         """Return the velocity (6,) of a site or body, linear [m/s] and angular [rad/s], along the floor's axes."""
         velocity = np.zeros(6)
         self._engine.mj_objectVelocity(self._model, data, kind, number, velocity, 0)
-        return np.roll(velocity, 3)
+        return velocity[[3, 4, 5, 0, 1, 2]]
 
 
 def _track(rate: float, error: Any, rate_error: Any, acceleration: Any = 0.0) -> Any:

@@ -31,8 +31,8 @@ class Step(NamedTuple):
     left: Array  # (2,) present error of the divergent component that it does not remove [m]
 
 
-def find_shift(error: Array, time_s: float, limits: StepLimits) -> Array:
-    """Return the least change (2,) of the foothold [m] after which an error (2,) of the divergent component is gone.
+def find_shift(error: Array, times_s: Array, limits: StepLimits) -> Array:
+    """Return the least changes (N, 2) of the foothold [m] after which an error (2,) is gone, by the times (N, 1) of touch-down.
 
     Until touch-down the error grows: e' = rate (e - z), with a change z of the ZMP within the ankles' range. So it ends within
     e G - z (G - 1) with G = exp(rate time), and the foothold takes what this interval does not bring to zero.
@@ -40,7 +40,7 @@ def find_shift(error: Array, time_s: float, limits: StepLimits) -> Array:
     Source:
         Englsberger, Ott, Albu-Schaeffer (2015); Khadiv et al. (2020) choose place and time by the same equation.
     """
-    growth = np.exp(limits.rate * time_s)
+    growth = np.exp(limits.rate * times_s)
     least = error * growth - limits.zmp_high * (growth - 1.0)
     most = error * growth - limits.zmp_low * (growth - 1.0)
     return np.asarray(np.clip(0.0, least, most) / limits.carry)
@@ -54,16 +54,13 @@ def choose_step(
     The cost is the squared change, ``OUT_OF_REACH`` times the squared error (now) that its limits leave, and the squared change
     of the time, of which a whole 1 / rate costs ``price_m`` [m].
     """
-    best_cost, best = np.inf, Step(time_s, np.zeros(2), error)
-    for candidate in (time_s, *np.linspace(fastest_s, max(slowest_s, fastest_s), CANDIDATES - 1).tolist()):
-        wanted = find_shift(error, candidate, limits)
-        shift = np.clip(wanted, limits.shift_low, limits.shift_high)
-        left = (wanted - shift) * limits.carry * np.exp(-limits.rate * candidate)
-        hurry = price_m * limits.rate * (candidate - time_s)
-        cost = OUT_OF_REACH * left @ left + shift @ shift + hurry**2
-        if cost < best_cost:
-            best_cost, best = cost, Step(candidate, shift, left)
-    return best
+    times = np.array([time_s, *np.linspace(fastest_s, max(slowest_s, fastest_s), CANDIDATES - 1)])[:, None]
+    wanted = find_shift(error, times, limits)
+    shifts = np.clip(wanted, limits.shift_low, limits.shift_high)
+    left = (wanted - shifts) * limits.carry * np.exp(-limits.rate * times)
+    hurry = price_m * limits.rate * (times[:, 0] - time_s)
+    best = int(np.argmin(OUT_OF_REACH * (left**2).sum(axis=1) + (shifts**2).sum(axis=1) + hurry**2))
+    return Step(float(times[best, 0]), shifts[best], left[best])
 
 
 def clip_to_soles(point: Array, places: Array, yaws: Array, reaches: Array) -> Array:

@@ -81,6 +81,7 @@ class WholeBodyQP:
         held = np.ptp(angles, axis=0) < 1e-6
         self._free = np.concatenate([addresses.root, addresses.rates[~held]])
         self._free_joints = np.flatnonzero(~held)
+        self._load_tasks = np.diag([1.0, 1.0, 1.0, *[2.0 / self._height] * 3] * 2) / self._mass
         self.cone = _make_cone(reference.soles, friction)
         self.failures = 0
 
@@ -162,7 +163,7 @@ class WholeBodyQP:
         goals[torso], weights[torso] = targets.torso, np.array([w.torso, w.torso, w.turn]) * self._height**2
         tasks[joints, root:count] = np.eye(moving)
         goals[joints], weights[joints] = targets.joints[self._free_joints], w.joints * self._height**2
-        tasks[loads, count:] = np.diag(np.tile(np.repeat([1.0, 2.0 / self._height], 3), 2)) / self._mass
+        tasks[loads, count:] = self._load_tasks
         weight = -self._gravity[2]
         goals[loads.start + 2], goals[loads.start + 8] = targets.load_left * weight, (1.0 - targets.load_left) * weight
         weights[loads] = w.loads
