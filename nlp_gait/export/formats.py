@@ -29,7 +29,6 @@ FORMATS = {
     "csv": ".csv",
     "json": ".signals.json",
     "mjcf": ".xml",
-    "mujoco-keyframes": ".keyframes.xml",
     "naoqi": ".naoqi.json",
     "ros": ".trajectory.json",
     "npz": ".npz",
@@ -54,8 +53,6 @@ def write_as(name: str, path: Path, result: Result, period_ms: int = PERIOD_MS) 
         write_text(path, format_motion(signals))
     elif name == "naoqi":
         write_json(path, to_naoqi(signals, result.problem.name))
-    elif name == "mujoco-keyframes":
-        write_text(path, format_keyframes(result, signals.arrays["t"]))
     elif name == "npz":
         write_reference(path, result, period_ms / 1000.0)
     elif name == "csv":
@@ -100,32 +97,6 @@ def to_naoqi(signals: Signals, owner: str) -> dict[str, Any]:
     times = [round(APPROACH_S + t, 3) for t in signals.arrays["t"].tolist()]
     keys = [signals.arrays["q"][:, signals.joints.index(name)].tolist() for name in names]
     return {"names": names, "keys": keys, "times": [times for _ in names], "isAbsolute": True}
-
-
-def format_keyframes(result: Result, times: Array) -> str:
-    """Return the simulated model with a key for each time (T,) [s]; raises InputError for a robot that moves in a plane.
-
-    ``qpos`` has the root's place [m] and attitude (w, x, y, z) and the joints' angles [rad], ``ctrl`` these angles as set-points.
-    """
-    plan = make_plan(result)
-    if plan.planar:
-        raise InputError(
-            f"the robot of {result.problem.name!r} moves in a plane and has no keyframes; export it as mjcf"
-        )
-    root = Xml.fromstring(make_plan_model(plan, Drive()))
-    # The engine's coordinates are in the order of the joints in the model, its controls in that of the actuators.
-    joints, driven = (
-        [plan.joints.index(element.attrib["name"]) for element in root.iter(tag)] for tag in ("joint", "position")
-    )
-    q = plan.at("q", times)
-    poses = np.hstack([plan.at("hip", times), plan.attitude(times), q[:, joints]])
-    keys = Xml.SubElement(root, "keyframe")
-    for t, pose, targets in zip(times.tolist(), poses, q[:, driven], strict=True):
-        values = {"qpos": pose, "ctrl": targets}
-        texts = {name: " ".join(map(repr, array.tolist())) for name, array in values.items()}
-        Xml.SubElement(keys, "key", {"name": f"{t:.6g} s", "time": repr(t), **texts})
-    Xml.indent(root)
-    return Xml.tostring(root, encoding="unicode") + "\n"
 
 
 def write_reference(path: Path, result: Result, period_s: float) -> None:

@@ -78,21 +78,6 @@ def test_naoqi_keys_move_every_motor_once_after_an_approach(result, tmp_path):
     assert np.diff(times).min() > 0.0
 
 
-def test_keyframes_put_the_engine_into_the_planned_poses(result, tmp_path):
-    mujoco = pytest.importorskip("mujoco")
-    write_as("mujoco-keyframes", tmp_path / "gait.xml", result, 500)
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "gait.xml"))
-    data = mujoco.MjData(model)
-    arrays = sample_at_period(result, 500).arrays
-    np.testing.assert_array_equal(model.key_time, arrays["t"])
-    for k in range(model.nkey):
-        mujoco.mj_resetDataKeyframe(model, data, k)
-        mujoco.mj_forward(model, data)
-        for side in ("left", "right"):
-            np.testing.assert_allclose(data.site(side).xpos, arrays[f"{side}_foot"][k], atol=1e-5)
-        np.testing.assert_allclose(data.ctrl, data.actuator_length, atol=1e-12)
-
-
 def test_a_reference_is_the_planned_motion_in_the_engine(result, tmp_path):
     """Played back by the names in the engine's model of the plan: bodies are where it has them, and move as they are said to."""
     mujoco = pytest.importorskip("mujoco")
