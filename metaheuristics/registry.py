@@ -58,17 +58,13 @@ def make_algorithm(name: str, /, **settings: object) -> Algorithm:
             package that it comes from is not installed.
     """
     if isinstance(name, str) and name in ADAPTERS:
-        check_installed(name, _find_package(name))
+        check_installed(name, name.partition(":")[0])
     return make_by_name("algorithm", name, {**ALGORITHMS, **ADAPTERS}, settings)
 
 
 def list_installed_algorithms() -> tuple[str, ...]:
     """Names of the algorithms that can run here: this package's own, and those whose package is installed."""
-    return (*ALGORITHMS, *(name for name in ADAPTERS if is_installed(_find_package(name))))
-
-
-def _find_package(name: str) -> str:
-    return name.partition(":")[0]
+    return (*ALGORITHMS, *(name for name in ADAPTERS if is_installed(name.partition(":")[0])))
 
 
 def make_handling(name: str, /, **settings: object) -> ConstraintHandling:

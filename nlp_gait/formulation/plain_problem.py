@@ -80,11 +80,8 @@ def _make(parts: _Parts, objective: Objective, tolerance: float) -> GaitProblem:
             raise InputError(
                 f"variable {name} needs finite bounds, got {low:g} and {high:g}: searches draw points in them"
             )
-    symbols, (values, lows, highs) = (
-        [*parts.x, *parts.p],
-        zip(*parts.rows.values(), strict=True) if parts.rows else ((),) * 3,
-    )
-    function = ca.Function("problem", symbols, [parts.f, *values])
+    values, lows, highs = ([row[k] for row in parts.rows.values()] for k in range(3))
+    function = ca.Function("problem", [*parts.x, *parts.p], [parts.f, *values])
     limits = ca.Function("limits", list(parts.p), [*lows, *highs])
     given, m = _split(ca.DM(parts.values), parts.p), len(parts.rows)
     defaults = [np.array(value).ravel() for value in limits.call(given)]
@@ -92,8 +89,7 @@ def _make(parts: _Parts, objective: Objective, tolerance: float) -> GaitProblem:
     points = [ca.DM([draw(low, high) for low, high, _ in parts.bounds]) for _ in range(SAMPLES)]
     samples = [function.call([*_split(point, parts.x), *given])[1:] for point in points]
     scales = [
-        _choose_scale([at_low, at_high], [np.array(rows[k]).ravel() for rows in samples])
-        for k, (at_low, at_high) in enumerate(zip(defaults[:m], defaults[m:], strict=True))
+        _choose_scale([defaults[k], defaults[m + k]], [rows[k].full().ravel() for rows in samples]) for k in range(m)
     ]
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
@@ -101,22 +97,20 @@ def _make(parts: _Parts, objective: Objective, tolerance: float) -> GaitProblem:
         f, *rows = function.call([*_split(point.x, parts.x), *_split(own, parts.p)])
         ends = [MX(ca.densify(end)) for end in limits.call(_split(own, parts.p))]
         constraints = []
-        for name, scale, value, low, high, at_low, at_high in zip(
-            parts.rows, scales, rows, ends[:m], ends[m:], defaults[:m], defaults[m:], strict=True
-        ):
-            slack = np.where(at_low == at_high, tolerance, 0.0)
-            constraints.append(
-                Constraint(
-                    name=name,
-                    labels=tuple(str(k) for k in range(value.shape[0])) if value.shape[0] > 1 else (),
-                    unit="1",
-                    scale=scale,
-                    value=ca.densify(value),
-                    lower=low - slack,
-                    upper=high + slack,
-                    over="once",
-                )
+        for k, (name, value) in enumerate(zip(parts.rows, rows, strict=True)):
+            slack = np.where(defaults[k] == defaults[m + k], tolerance, 0.0)
+            labels = tuple(map(str, range(value.shape[0]))) if value.shape[0] > 1 else ()
+            row = Constraint(
+                name=name,
+                labels=labels,
+                unit="1",
+                scale=scales[k],
+                value=ca.densify(value),
+                lower=ends[k] - slack,
+                upper=ends[m + k] + slack,
+                over="once",
             )
+            constraints.append(row)
         return Assembly(objective=ca.densify(f), constraints=tuple(constraints))
 
     parameters = [name for symbol in parts.p for name in _name_entries(symbol)]

@@ -56,7 +56,6 @@ class NativeRows:
         loaded.nlp_gait_rows_memory.restype = _INTEGER
         self._memory_size = int(loaded.nlp_gait_rows_memory())
         self._local = threading.local()
-        self.description = f"compiled by {compiler.summary}, {lanes} rows at a time"
 
     def __call__(self, inputs: Sequence[Array], shared: bytes, outputs: Sequence[Array | None], rows: int) -> None:
         """Fill the outputs that are not None; all arrays contiguous, aligned doubles; 1 in ``shared``: one row for all."""
@@ -93,7 +92,6 @@ class InterpretedRows:
 
     def __init__(self, problem: GaitProblem) -> None:
         self._function = build_exact_model(problem).function
-        self.description = "interpreted by CasADi's virtual machine"
 
     @lock_casadi
     def __call__(self, inputs: Sequence[Array], shared: bytes, outputs: Sequence[Array | None], rows: int) -> None:
@@ -171,7 +169,6 @@ class CompiledObjective:
         self.upper = problem.upper  #: (n,) current upper bounds
         self.row_names = model.row_names  #: (m,) constraint rows, in the order of ``constraints``
         self.backend: Literal["compiled", "interpreted"] = evaluate_rows.backend
-        self.description = evaluate_rows.description  #: backend, compiler and lane count, in words
         self._evaluate_rows = evaluate_rows
         self._shared = (np.array(problem.p), *model.row_bounds(problem), 1.0 / model.row_scales)
         #: (m - n,) names of the rows without their places, those of the variables left out
