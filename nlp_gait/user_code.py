@@ -20,11 +20,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
+from importlib.abc import ExecutionLoader, MetaPathFinder
+from importlib.machinery import ModuleSpec
 from importlib.metadata import entry_points
 from pathlib import Path
 from symtable import symtable
 from types import ModuleType
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, TypeVar
 
 from nlp_gait.errors import GaitError, UserCodeError, unknown
 from nlp_gait.files import check_path, read_bytes
@@ -48,18 +50,6 @@ IMPORTS_ALL = re.compile(rb"\bimport\s*\*")
 _allowed: list[str] = []
 
 
-class CodeReference(NamedTuple):
-    """Place of an object in user code."""
-
-    home: str  # absolute path of a file, or dotted name of a module
-    name: str  # of the object in it; the text itself for a program
-
-    @property
-    def is_file(self) -> bool:
-        """Whether the home is a file."""
-        return os.path.isabs(self.home)
-
-
 @dataclass(frozen=True)
 class SourceFiles:
     """A user's file and the files that it imports from its folder, as they were read."""
@@ -73,19 +63,15 @@ class SourceFiles:
         return self.folder / next(iter(self.contents))
 
     @cached_property
-    def hashes(self) -> dict[str, str]:
-        """SHA-256 of each file by its relative path."""
-        return {name: hashlib.sha256(content).hexdigest() for name, content in self.contents.items()}
-
-    @cached_property
     def digest(self) -> str:
         """Hash of all files, wherever they lie."""
-        return hash_names(self.hashes)
+        hashes = {name: hashlib.sha256(content).hexdigest() for name, content in self.contents.items()}
+        return hashlib.sha256(repr(sorted(hashes.items())).encode()).hexdigest()
 
-
-def hash_names(hashes: Mapping[str, str]) -> str:
-    """Return the hash of the SHA-256 of files by their relative paths."""
-    return hashlib.sha256(repr(sorted(hashes.items())).encode()).hexdigest()
+    @property
+    def prefix(self) -> str:
+        """Package of these modules, whose name contains the hash of all of them."""
+        return f"nlp_gait_user_{hashlib.sha256(f'{self.folder}{self.digest}'.encode()).hexdigest()[:16]}"
 
 
 def is_program(text: str) -> bool:
@@ -129,14 +115,6 @@ def shorten_reference(text: str) -> str:
     return f"{Path(home).name}:{name}" if colon and home.endswith(ENDING) else text
 
 
-def parse_reference(text: str, kind: Kind) -> CodeReference:
-    """Return the place of an object from a reference or the name of an entry point."""
-    if is_program(text):
-        return CodeReference(_find_program_file(text), text)
-    home, _, name = find_entry_points(kind).get(text, text).rpartition(":")
-    return CodeReference(os.path.abspath(home) if home.endswith(ENDING) else home, name)
-
-
 def allow_code(text: str) -> None:
     """Allow data files to refer to code, because the user named it."""
     if is_reference(text) and text not in _allowed:
@@ -178,11 +156,30 @@ def parse_command(text: str) -> tuple[str, ...]:
     return words
 
 
-def _find_program_file(text: str) -> str:
-    """Return the absolute path of a command's own file: the script that it names, else the program."""
-    words = split_command(text)
-    scripts = (word for word in words if os.path.isfile(word) and not (word == words[0] and os.path.isabs(word)))
-    return os.path.abspath(next(scripts, None) or shutil.which(words[0]) or words[0])
+def find_source(text: str, kind: Kind) -> Path:
+    """Return the file of an object, or of a program the script that it names, else the program itself; raises UserCodeError."""
+    if is_program(text):
+        words = parse_command(text)
+        scripts = (word for word in words if os.path.isfile(word) and not (word == words[0] and os.path.isabs(word)))
+        return Path(os.path.abspath(next(scripts, None) or shutil.which(words[0]) or words[0]))
+    home, name = _split_reference(text, kind)
+    if home.endswith(ENDING):
+        check_path(home, f"code of {text!r}, {home!r}", UserCodeError)
+        return Path(home)
+    try:
+        spec = importlib.util.find_spec(home)
+    except (ImportError, ValueError):
+        spec = None
+    if spec is None or not spec.origin or not spec.origin.endswith(ENDING):
+        file = f"{home.replace('.', '/')}.py:{name}"
+        raise UserCodeError(f"{text!r}: no module {home!r} is installed; name a file as {file}")
+    return Path(spec.origin)
+
+
+def _split_reference(text: str, kind: Kind) -> tuple[str, str]:
+    """Return the absolute path of a file or the name of a module, and the name of the object in it."""
+    home, _, name = find_entry_points(kind).get(text, text).rpartition(":")
+    return os.path.abspath(home) if home.endswith(ENDING) else home, name
 
 
 def read_source_files(text: str, kind: Kind) -> SourceFiles:
@@ -190,9 +187,7 @@ def read_source_files(text: str, kind: Kind) -> SourceFiles:
 
     A program's file imports the files of the same ending in its folder whose names occur in it.
     """
-    if is_program(text):
-        parse_command(text)
-    main = Path(_find_source(parse_reference(text, kind), text))
+    main = find_source(text, kind)
     contents, waiting = {main: _read(main, f"code of {text!r},")}, [main]
     while waiting:
         importer = waiting.pop()
@@ -229,19 +224,17 @@ def _find_imports(content: bytes, path: Path, main: Path) -> Iterator[Path]:
 
 def check_reference(text: str, kind: Kind) -> None:
     """Check, without running anything, that an object can exist; raises UserCodeError (no file) or UnknownNameError (no name)."""
+    path = find_source(text, kind)
     if is_program(text):
-        parse_command(text)
         return
-    place = parse_reference(text, kind)
-    path = _find_source(place, text)
-    content = _read(Path(path), f"code of {text!r},")
+    content, name = _read(path, f"code of {text!r},"), _split_reference(text, kind)[1]
     try:
-        symbols = symtable(importlib.util.decode_source(content), path, "exec").get_symbols()
+        symbols = symtable(importlib.util.decode_source(content), str(path), "exec").get_symbols()
     except (SyntaxError, ValueError):
         return  # running it reports the error
     names = [symbol.get_name() for symbol in symbols if symbol.is_assigned() or symbol.is_imported()]
-    if place.name not in names and not IMPORTS_ALL.search(content):
-        raise unknown(f"name in {Path(place.home).name}", place.name, names)
+    if name not in names and not IMPORTS_ALL.search(content):
+        raise unknown(f"name in {path.name}", name, names)
 
 
 def load_object(text: str, kind: Kind, files: SourceFiles | None = None) -> object:
@@ -251,87 +244,80 @@ def load_object(text: str, kind: Kind, files: SourceFiles | None = None) -> obje
     """
     if is_program(text):
         raise UserCodeError(f"{text!r} is a program: it can be an algorithm, not a {kind}")
-    place = parse_reference(text, kind)
-    if place.is_file:
+    home, name = _split_reference(text, kind)
+    full = home
+    if home.endswith(ENDING):
         files = files or read_source_files(text, kind)
-        run = partial(UserModules(files).load, files.main.stem)
+        full = f"{files.prefix}.{files.main.stem}"
+        if files.prefix not in sys.modules:
+            sys.meta_path.append(UserModules(files))
     else:
-        run = partial(importlib.import_module, place.home)
-    module = call_user_code(text, _find_source(place, text), run)
-    if not hasattr(module, place.name):
-        raise unknown(f"name in {place.home}", place.name, [n for n in vars(module) if not n.startswith("_")])
-    return getattr(module, place.name)
+        find_source(text, kind)  # it explains what is missing
+    module = call_user_code(text, partial(importlib.import_module, full))
+    if not hasattr(module, name):
+        raise unknown(f"name in {home}", name, [n for n in vars(module) if not n.startswith("_")])
+    return getattr(module, name)
 
 
 def forget_code(text: str) -> None:
     """Let a file that was loaded run again when it is loaded the next time."""
-    prefix = UserModules(read_source_files(text, "problem")).prefix
+    prefix = read_source_files(text, "problem").prefix
     for name in [name for name in sys.modules if name.startswith(prefix)]:
         del sys.modules[name]
 
 
-class UserModules:
-    """The modules of a user's file, under names that contain the hash of all of them."""
+class UserModules(MetaPathFinder, ExecutionLoader):
+    """Finder and loader of a user's files as they were read, in their package; see ``SourceFiles.prefix``."""
 
     def __init__(self, files: SourceFiles) -> None:
         self._files = files
-        self.prefix = f"nlp_gait_user_{hashlib.sha256(f'{files.folder}{files.digest}'.encode()).hexdigest()[:16]}"
 
-    def load(self, name: str) -> ModuleType:
-        """Return a module by its name, dotted in a package; runs it on the first call."""
-        full, path = f"{self.prefix}.{name}", name.replace(".", "/")
-        if full in sys.modules:
-            return sys.modules[full]
-        parent, _, last = name.rpartition(".")
-        if parent:
-            self.load(parent)
-        is_package = f"{path}/__init__.py" in self._files.contents
-        file = f"{path}/__init__.py" if is_package else path + ENDING
-        module = ModuleType(full)
-        module.__file__ = str(self._files.folder / file)
-        module.__package__ = full if is_package else full.rpartition(".")[0]
+    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
+        """Return the specification of one of the modules; None for another one."""
+        if fullname.partition(".")[0] != self._files.prefix:
+            return None
+        if self._find(fullname):
+            return importlib.util.spec_from_loader(fullname, self)
+        folder = f"{self._get_path(fullname)}/".lstrip("/")
+        is_folder = any(name.startswith(folder) for name in self._files.contents)
+        return ModuleSpec(fullname, None, is_package=True) if is_folder else None
+
+    def get_filename(self, fullname: str) -> str:
+        """Return the path of a module's file."""
+        return str(self._files.folder / self._find(fullname))
+
+    def get_source(self, fullname: str) -> str:
+        """Return the source of a module."""
+        return importlib.util.decode_source(self._files.contents[self._find(fullname)])
+
+    def is_package(self, fullname: str) -> bool:
+        """Return whether a module contains others."""
+        return self._find(fullname).endswith("__init__.py")
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Run a module; what it imports is looked for among these files first, as for scripts."""
         vars(module)["__builtins__"] = {**vars(builtins), "__import__": self._import}
-        sys.modules[full] = module  # before it runs: its data classes look there
-        try:
-            # What was read and hashed, not what is in the file now.
-            exec(compile(self._files.contents[file], module.__file__, "exec", dont_inherit=True), vars(module))  # noqa: S102
-        except BaseException:
-            del sys.modules[full]
-            raise
-        if parent:
-            setattr(sys.modules[f"{self.prefix}.{parent}"], last, module)
-        return module
+        super().exec_module(module)
 
-    def _contain(self, name: str) -> bool:
-        path = name.replace(".", "/")
-        return path + ENDING in self._files.contents or f"{path}/__init__.py" in self._files.contents
+    def _get_path(self, fullname: str) -> str:
+        return fullname.removeprefix(self._files.prefix).strip(".").replace(".", "/")
+
+    def _find(self, fullname: str) -> str:
+        path = self._get_path(fullname)
+        return next((name for name in (path + ENDING, f"{path}/__init__.py") if name in self._files.contents), "")
 
     def _import(
-        self,
-        name: str,
-        globals: Mapping[str, Any] | None = None,
-        locals: Mapping[str, Any] | None = None,
-        fromlist: Sequence[str] | None = (),
-        level: int = 0,
+        self, name: str, globals: Any = None, locals: Any = None, fromlist: Sequence[str] = (), level: int = 0
     ) -> ModuleType:
-        """Import as ``__import__``; a module of these files comes before one of that name elsewhere, as for scripts."""
-        if level:
-            package = str((globals or {}).get("__package__", "")).split(".")[1:]  # without the prefix
-            name = ".".join(filter(None, [*package[: len(package) - level + 1], name]))
-            if not name:
-                raise ImportError("attempted relative import with no known parent package")
-        if not level and not self._contain(name.partition(".")[0]):
+        """Import as ``__import__``."""
+        top, prefix = name.partition(".")[0], self._files.prefix
+        if level or self.find_spec(f"{prefix}.{top}") is None:
             return builtins.__import__(name, globals, locals, fromlist or (), level)
-        if name and not self._contain(name):
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-        for item in fromlist or ():
-            inner = f"{name}.{item}".strip(".")
-            if self._contain(inner):
-                self.load(inner)
-        return self.load(name if fromlist else name.partition(".")[0])
+        module = builtins.__import__(f"{prefix}.{name}", globals, locals, fromlist or (), 0)
+        return module if fromlist else sys.modules[f"{prefix}.{top}"]
 
 
-def call_user_code(text: str, path: str, call: Callable[[], T]) -> T:
+def call_user_code(text: str, call: Callable[[], T]) -> T:
     """Return the result of user code, which prints to standard error; raises UserCodeError with the line where it fails."""
     try:
         with redirect_stdout(sys.stderr):
@@ -339,6 +325,7 @@ def call_user_code(text: str, path: str, call: Callable[[], T]) -> T:
     except (KeyboardInterrupt, GaitError):
         raise
     except BaseException as error:  # SystemExit too: it must not end the command
+        path = os.path.abspath(text.rpartition(":")[0])
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame for frame in frames if os.path.abspath(frame.filename) == path]
         where = f" at line {lines[-1].lineno}, `{lines[-1].line}`" if lines else ""
@@ -347,20 +334,6 @@ def call_user_code(text: str, path: str, call: Callable[[], T]) -> T:
             message = "a function of CasADi does not take these arguments"
         what = type(error).__name__ + (message and f": {message}")
         raise UserCodeError(f"{text!r} fails{where}: {what}") from error
-
-
-def _find_source(place: CodeReference, text: str) -> str:
-    if place.is_file:
-        check_path(place.home, f"code of {text!r}, {place.home!r}", UserCodeError)
-        return place.home
-    try:
-        spec = importlib.util.find_spec(place.home)
-    except (ImportError, ValueError):
-        spec = None
-    if spec is None or not spec.origin or not spec.origin.endswith(ENDING):
-        file = f"{place.home.replace('.', '/')}.py:{place.name}"
-        raise UserCodeError(f"{text!r}: no module {place.home!r} is installed; name a file as {file}")
-    return spec.origin
 
 
 def _read(path: Path, what: str = "code") -> bytes:

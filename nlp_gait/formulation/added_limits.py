@@ -80,8 +80,7 @@ def _load_limit(name: str) -> Any:
         raise unknown("limit", name, [*LIMITS, *user_code.find_entry_points("limit")])
     user_code.allow_code(name)
     loaded: Any = user_code.load_object(name, "limit")
-    path = user_code.parse_reference(name, "limit").home
-    limit = user_code.call_user_code(name, path, loaded) if isinstance(loaded, type) else loaded
+    limit = user_code.call_user_code(name, loaded) if isinstance(loaded, type) else loaded
     _check_limit(limit, name)
     return limit
 

@@ -93,7 +93,6 @@ def _load_user_maker(name: str) -> Maker:
     user_code.allow_code(name)
     files = user_code.read_source_files(name, "problem")
     loaded: Any = user_code.load_object(name, "problem", files)
-    path = user_code.parse_reference(name, "problem").home
     make: Maker
     if isinstance(loaded, GaitProblem):
 
@@ -114,10 +113,9 @@ def _load_user_maker(name: str) -> Maker:
     @functools.wraps(make)
     def make_checked(**options: Any) -> GaitProblem:
         check_options(make, options)
-        problem = name_problem(
-            user_code.call_user_code(name, path, lambda: make(**options)), user_code.shorten_name(name)
-        )
-        user_code.call_user_code(name, path, lambda: check_mathematics(problem))
+        made = user_code.call_user_code(name, lambda: make(**options))
+        problem = name_problem(made, user_code.shorten_name(name))
+        user_code.call_user_code(name, lambda: check_mathematics(problem))
         hashes = {**problem.files, "code": files.digest}
         return replace(problem, loaded_as=name, files=hashes).with_origin(origin, options)
 
