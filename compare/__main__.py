@@ -6,7 +6,7 @@ import sys
 
 from nlp_gait.errors import describe_shortage
 from nlp_gait.interrupts import exit_on_interrupt
-from nlp_gait.processes import hide_working_folder, kill_children
+from nlp_gait.processes import kill_children
 
 
 def fix_environment() -> None:
@@ -20,7 +20,6 @@ def fix_environment() -> None:
 def main() -> None:
     """Run the command line."""
     exit_on_interrupt()
-    hide_working_folder()
     fix_environment()
     try:
         gc.disable()  # while modules are imported, every collection would find nothing

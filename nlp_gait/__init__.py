@@ -6,7 +6,7 @@ exact functions to search algorithms.
 
 from __future__ import annotations
 
-from nlp_gait.providers import import_object
+from nlp_gait.providers import PROBLEMS, import_object
 
 # In place of typing's, whose import takes longer than all that Ctrl-C waits for; type checkers know the name.
 TYPE_CHECKING = False
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from nlp_gait.formulation import list_problems as list_problems
     from nlp_gait.formulation.plain_problem import problem as problem
     from nlp_gait.formulation.solution import Solution as Solution
-    from nlp_gait.loading import load as load
 
 __version__ = "0.2.0"
 # Imported on first use: a search needs no NLP solver, a solve no kernel, and the command line starts quickly.
@@ -43,10 +42,26 @@ _PUBLIC = {
     "nlp_gait.backends.solve": "solve",
     "nlp_gait.backends.solvers.ipopt": "IpoptSettings",
     "nlp_gait.backends.solvers.registry": "make_solver",
-    "nlp_gait.loading": "load",
 }
 _PLACES = {name: f"{module}:{name}" for module, names in _PUBLIC.items() for name in names.split()}
-__all__ = sorted([*_PLACES, "compare"])
+__all__ = sorted([*_PLACES, "compare", "load"])
+
+
+def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
+    """Return a problem, see ``find_maker``, or an instance of GaitBench, ``load("ssp-v5")`` or ``load("gb2:ssp:3")``, by name.
+
+    It is built with the given options; the others keep their defaults. A problem of this package with equal options is made
+    once, unless they name a file. Raises UnknownNameError, and InputError for a value that the option does not allow, or user
+    code that fails.
+    """
+    from nlp_gait.formulation.registry import load as load_problem
+
+    if name not in PROBLEMS and isinstance(name, str):
+        from nlp_gait.gaitbench.generated import resolve_name
+
+        name, instance = resolve_name(name)
+        options = {**instance, **options}
+    return load_problem(name, **options)
 
 
 def __getattr__(name: str) -> Any:

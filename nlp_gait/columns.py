@@ -13,8 +13,7 @@ from nlp_gait.files import is_numeric_text, read_text
 DELIMITERS = ",;\t"
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 UNNAMED = ("", "Unnamed: 0")  # names of an index, written by R and pandas
-EXACT = 2.0**53  # the floats from here on are not all whole numbers
-MOST = 2**63 - 1  # a whole number in 64 bits, as other programs read it
+MOST = 2**53  # whole number that floats contain exactly
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +48,7 @@ class CsvTable:
     def count(self, name: str, row: int, value: float, at_least: int = 0) -> int:
         """Return the value of a cell as a whole number; raises InputError."""
         if not (math.isfinite(value) and value == int(value) and at_least <= value <= MOST):
-            cell, wanted = f"{self.owner}, line {self.lines[row]}: {name}", f"a whole number >= {at_least} and < 2^63"
+            cell, wanted = f"{self.owner}, line {self.lines[row]}: {name}", f"a whole number >= {at_least} and <= 2^53"
             raise InputError(f"{cell} must be {wanted}, got {value:g}; fix the cell")
         return int(value)
 
@@ -73,30 +72,35 @@ def parse_table(text: str, owner: str) -> CsvTable:
     What other programs add is skipped: a line ``sep=``, an unnamed column that counts the rows, unnamed empty columns at the end,
     and lines that begin with ``#``, of which the last one may be the header. Raises InputError with the line and its cause.
     """
-    comments = [line for line in text.splitlines() if line.startswith("#")]
+    comments = [line.strip("# ") for line in text.splitlines() if line.startswith("#")]
     lines = ["" if line.startswith("#") else line for line in text.splitlines()]
     first = next((line for line in lines if line.strip()), "")
+    delimiter = max(DELIMITERS, key=first.count)
     if declared := re.fullmatch(r'"?sep=(.)"?', first.strip(" \r")):
         lines[lines.index(first)] = ""
         delimiter = declared[1]
-    else:
-        delimiter = max(DELIMITERS, key=first.count)
     rows = _split_cells(lines, delimiter, owner)
-    header: tuple[str, ...] = ()
-    if rows and not all(_is_number(cell) for cell in rows[0][1] if cell):
-        header = tuple(rows.pop(0)[1])
-    elif (
-        rows and comments and len(names := comments[-1].strip("# ").split(delimiter)) == len(rows[0][1]) > 1
-    ):  # NumPy's savetxt
-        header = tuple(name.strip() for name in names)
-    if not rows:
+    has_header = bool(rows) and not all(_is_number(cell) for cell in rows[0][1] if cell)
+    if rows and comments and not has_header:  # NumPy's savetxt
+        names = [name.strip() for name in comments[-1].split(delimiter)]
+        if has_header := len(names) == len(rows[0][1]) > 1:
+            rows.insert(0, (0, names))
+    if len(rows) <= has_header:
         raise InputError(f"{owner} has no rows of numbers")
-    header, rows = _drop_unnamed_columns(header, rows)
+    rows = _drop_unnamed_columns(rows, has_header)
+    header = tuple(rows.pop(0)[1]) if has_header else ()
     if "" in header:
         raise InputError(f"{owner}: column {header.index('') + 1} has no name; name it or remove it")
     if repeated := [name for k, name in enumerate(header) if name in header[:k]]:
         raise InputError(f"{owner}: two columns have the same name {repeated[0]!r}; rename one of them")
-    _check_decimals(rows, owner)
+    commas = [(number, cell) for number, row in rows for cell in row if "," in cell]
+    points = any("." in cell for _, row in rows for cell in row)
+    if commas and (points or all(THOUSANDS.fullmatch(cell) for _, cell in commas)):
+        number, cell = commas[0]
+        raise InputError(
+            f"{owner}, line {number}: the comma in {cell[:40]!r} may be a decimal comma or separate thousands; write decimal "
+            "points, and no separators of thousands"
+        )
     width = len(header) or len(rows[0][1])
     for number, row in rows:
         if len(row) != width:
@@ -105,12 +109,13 @@ def parse_table(text: str, owner: str) -> CsvTable:
         for cell in row:
             if cell and not _is_number(cell):
                 raise InputError(f"{owner}, line {number}: expected a number, got {cell[:40]!r}")
+    texts = tuple(tuple(cell.replace(",", ".") for cell in row) for _, row in rows)
     return CsvTable(
         owner=owner,
         header=header,
-        rows=tuple(tuple(_parse_number(cell) if cell else math.nan for cell in row) for _, row in rows),
+        rows=tuple(tuple(float(cell) if cell else math.nan for cell in row) for row in texts),
         lines=tuple(number for number, _ in rows),
-        texts=tuple(tuple(cell.replace(",", ".") for cell in row) for _, row in rows),
+        texts=texts,
     )
 
 
@@ -128,42 +133,17 @@ def _split_cells(lines: Sequence[str], delimiter: str, owner: str) -> list[tuple
     return rows
 
 
-def _drop_unnamed_columns(
-    header: tuple[str, ...], rows: list[tuple[int, list[str]]]
-) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]]:
+def _drop_unnamed_columns(rows: list[tuple[int, list[str]]], has_header: bool) -> list[tuple[int, list[str]]]:
     """Leave out what spreadsheets and data frames add: empty columns at the end, and a first one that counts the rows."""
     width = max(len(row) for _, row in rows)
-    while width > 1 and not any(header[width - 1 :]) and not any(cell for _, row in rows for cell in row[width - 1 :]):
+    while width > 1 and not any(cell for _, row in rows for cell in row[width - 1 :]):
         width -= 1
-    header, rows = header[:width], [(number, row[:width]) for number, row in rows]
-    if not header:
-        return header, rows
-    counted = [row[0] for _, row in rows]
-    counts = any(counted == [str(k + begin) for k in range(len(rows))] for begin in (0, 1))
-    if header[0] in UNNAMED and counts:
-        return header[1:], [(number, row[1:]) for number, row in rows]
-    return header, rows
-
-
-def _check_decimals(rows: Sequence[tuple[int, Sequence[str]]], owner: str) -> None:
-    """Raise InputError for commas that may separate thousands: next to decimal points, or before three digits everywhere."""
-    cells = [(number, cell) for number, row in rows for cell in row]
-    commas = [(number, cell) for number, cell in cells if "," in cell]
-    points = any("." in cell for _, cell in cells)
-    if commas and (points or all(THOUSANDS.fullmatch(cell) for _, cell in commas)):
-        number, cell = commas[0]
-        raise InputError(
-            f"{owner}, line {number}: the comma in {cell[:40]!r} may be a decimal comma or separate thousands; write decimal "
-            "points, and no separators of thousands"
-        )
+    name, *counts = [row[0] for _, row in rows]
+    is_index = has_header and name in UNNAMED
+    is_index = is_index and counts in ([str(k + begin) for k in range(len(counts))] for begin in (0, 1))
+    return [(number, row[is_index:width]) for number, row in rows]
 
 
 def _is_number(cell: str) -> bool:
     """Return whether a cell is a number with a decimal point or comma."""
     return is_numeric_text(cell.replace(",", ".", 1))
-
-
-def _parse_number(cell: str) -> float:
-    """Return a number; a whole one that a float would round stays whole, as seeds do."""
-    value = float(cell.replace(",", ".", 1))
-    return int(cell) if abs(value) >= EXACT and cell.isdecimal() else value

@@ -25,35 +25,26 @@ LARGEST_FILE = 64 * 2**20  # bytes; a record has about 10 kB, a result with thou
 DEEPEST = 32  # levels of objects and lists; files of this package have six
 LARGEST_INTEGER = 2**63 - 1
 SHOWN = 60  # characters of a value in a message
-LOCK = ".lock"  # stays in its folder: removed, it could be locked twice
-LOCK_CHECKED_EVERY_S = 0.01
-WAIT_SILENTLY_S = 5.0
+LOCK_CHECKED_EVERY_S, WAIT_SILENTLY_S = 0.01, 5.0
 FORMULA = tuple("=+-@")  # a spreadsheet computes a cell that begins with one of these
 
 
 @contextmanager
-def lock_folder(path: Path, name: str = LOCK) -> Iterator[None]:
+def lock_folder(path: Path, name: str = ".lock") -> Iterator[None]:
     """Let one process at a time into such a block for a folder, by a file in it; no lock where that cannot be written."""
     from filelock import FileLock, Timeout  # on first use: most commands lock nothing
 
-    lock = FileLock(path / name)
+    lock = FileLock(path / name)  # the file stays: removed, it could be locked twice
     with suppress(OSError):  # a folder that may only be read, a full disk
         try:
             lock.acquire(timeout=WAIT_SILENTLY_S, poll_interval=LOCK_CHECKED_EVERY_S)
         except Timeout:
-            warn_once(
-                f"waiting for another process that works in {path}; delete {path / name} if no process works there"
-            )
+            warn_once(f"waiting for another process that works in {path}")
             lock.acquire(poll_interval=LOCK_CHECKED_EVERY_S)
     try:
         yield
     finally:
         lock.release()
-
-
-def make_folder(path: Path) -> None:
-    """Make a folder and its parents; existing ones are left alone; raises OSError."""
-    path.mkdir(parents=True, exist_ok=True)
 
 
 def make_file_name(name: str) -> str:
@@ -99,21 +90,38 @@ def read_json(path: Path, what: str, *, error: type[GaitError] = InputError, rem
     return data
 
 
-def check_plain(data: Any) -> None:
+def check_plain(data: Any, where: str = "", level: int = 1) -> None:
     """Check that data are plain: texts, finite numbers, booleans, null, lists, objects; raises ValueError with the place."""
-    waiting: list[tuple[str, Any, int]] = [("", data, 1)]
-    while waiting:
-        where, value, level = waiting.pop()
-        if level > DEEPEST:
-            raise ValueError(f"it nests deeper than {DEEPEST} levels")
-        if isinstance(value, (list, tuple)):
-            waiting += [(f"{where}[{i}]", inner, level + 1) for i, inner in enumerate(value)]
-        elif isinstance(value, Mapping):
-            for key, inner in value.items():
-                _check_leaf(f"a key of {where}" if where else "a key", key)
-                waiting.append((f"{where}.{key}" if where else str(key), inner, level + 1))
-        else:
-            _check_leaf(where or "the value", value)
+    reason = ""
+    if level > DEEPEST:
+        raise ValueError(f"it nests deeper than {DEEPEST} levels")
+    if isinstance(data, (list, tuple)):
+        for i, inner in enumerate(data):
+            check_plain(inner, f"{where}[{i}]", level + 1)
+    elif isinstance(data, Mapping):
+        for key, inner in data.items():
+            check_plain(key, f"a key of {where}" if where else "a key", level)
+            check_plain(inner, f"{where}.{key}" if where else str(key), level + 1)
+    elif isinstance(data, float):
+        reason = "" if math.isfinite(data) else f"must be finite, got {data}"
+    elif isinstance(data, str):
+        if _has_surrogates(data):
+            reason = f"contains an unpaired surrogate, got {_shorten(data)!r}"
+    elif isinstance(data, int):
+        if abs(data) > LARGEST_INTEGER:
+            reason = f"must be within 64 bits, got a whole number of {data.bit_length()} bits"
+    elif data is not None:
+        reason = f"must be a text, a number, a list or a table, got {type(data).__name__}"
+    if reason:
+        raise ValueError(f"{_shorten(where or 'the value')!r} {reason}")
+
+
+def _has_surrogates(text: str) -> bool:
+    return not text.isascii() and any("\ud800" <= sign <= "\udfff" for sign in text)
+
+
+def _shorten(text: str) -> str:
+    return text if len(text) <= 4 * SHOWN else f"{text[: 4 * SHOWN]} ..."
 
 
 def write_text(path: Path, text: str) -> Path:
@@ -223,27 +231,6 @@ def _reject_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return table
 
 
-def _check_leaf(where: str, value: Any) -> None:
-    reason = ""
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            reason = f"must be finite, got {value}"
-    elif isinstance(value, str):
-        if not value.isascii() and not value.isprintable() and any("\ud800" <= sign <= "\udfff" for sign in value):
-            reason = f"contains an unpaired surrogate, got {_shorten(value)!r}"
-    elif isinstance(value, int):
-        if abs(value) > LARGEST_INTEGER:
-            reason = f"must be within 64 bits, got a whole number of {value.bit_length()} bits"
-    elif value is not None:
-        reason = f"must be a text, a number, a list or a table, got {type(value).__name__}"
-    if reason:
-        raise ValueError(f"{_shorten(where)!r} {reason}")
-
-
-def _shorten(text: str) -> str:
-    return text if len(text) <= 4 * SHOWN else f"{text[: 4 * SHOWN]} ..."
-
-
 @contextmanager
 def make_temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> Iterator[Path]:
     """Yield a temporary folder, removed at the end; raises ``error`` if the system has no place for it."""
@@ -256,7 +243,7 @@ def make_temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> 
 
 def check_path(path: str, owner: str, error: type[GaitError]) -> None:
     """Check that records can contain a path; raises ``error``, with ``owner`` in front, if it is not valid UTF-8."""
-    if any("\ud800" <= sign <= "\udfff" for sign in path):
+    if _has_surrogates(path):
         raise error(f"{owner}: its name is not valid UTF-8; choose another name")
 
 
@@ -264,6 +251,6 @@ def make_writable_folder(path: Path) -> Path:
     """Make a folder and check, before the work, that files can be written there; raises OutputError."""
     check_path(str(path), f"cannot write to {str(path)!r}", OutputError)
     with convert_errors(f"cannot write to {str(path)!r}", OutputError, "choose another folder with --out"):
-        make_folder(path)
+        path.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=path).close()
     return path

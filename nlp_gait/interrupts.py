@@ -1,4 +1,4 @@
-"""Ctrl-C: while the command line starts, around code that would swallow it, and in child processes.
+"""Ctrl-C: while the command line starts, around code that would swallow it, and in child processes; callbacks of long work.
 
 The command line imports this module before everything else, so it imports nothing that takes time.
 """
@@ -11,6 +11,8 @@ from types import FrameType
 
 # Called between steps of long work; returns whether to end at once.
 Stop = Callable[[], bool]
+# Called with a short line about each step.
+Progress = Callable[[str], None]
 
 
 class Interrupted(KeyboardInterrupt):
@@ -28,6 +30,10 @@ class Interrupted(KeyboardInterrupt):
 def never() -> bool:
     """Return False: the default of every argument ``stop``."""
     return False
+
+
+def ignore_progress(_: str) -> None:
+    """Ignore progress: the default of every argument ``progress``."""
 
 
 def exit_on_interrupt() -> None:
@@ -60,7 +66,15 @@ def defer_interrupts() -> Iterator[Callable[[], bool]]:
 
     For compiled code that would swallow the exception: CasADi takes it for a failed evaluation and continues.
     """
-    with count_interrupts(1) as presses:
+    presses: list[int] = []
+
+    def count(number: int, frame: FrameType | None) -> None:
+        presses.append(number)
+        if len(presses) > 1:
+            raise KeyboardInterrupt
+
+    count.defers = True  # type: ignore[attr-defined]
+    with _handle_interrupts(count):
         yield lambda: bool(presses)
 
 
@@ -80,29 +94,11 @@ def delay_interrupts() -> Iterator[None]:
 
 
 @contextmanager
-def count_interrupts(deferred: int = 0) -> Iterator[list[int]]:
-    """Yield the presses of Ctrl-C inside; all but the deferred first ones raise KeyboardInterrupt, which code may swallow."""
-    presses: list[int] = []
-
-    def count(number: int, frame: FrameType | None) -> None:
-        presses.append(number)
-        if len(presses) > deferred:
-            raise KeyboardInterrupt
-
-    count.defers = deferred > 0  # type: ignore[attr-defined]
-    with _handle_interrupts(count):
-        yield presses
-
-
-@contextmanager
 def block_interrupts_in_children() -> Iterator[None]:
     """Block Ctrl-C, which a terminal sends to all processes, in those started inside: their parent ends them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    from multiprocessing import resource_tracker
-
-    resource_tracker.ensure_running()  # started inside, with the first worker, it would unblock Ctrl-C
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

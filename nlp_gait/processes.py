@@ -1,7 +1,7 @@
 """Child processes: a pool of jobs, each with a time limit, and forks that share work. None of them outlives its parent.
 
 A fork has everything that its parent has and starts within milliseconds; only results are pickled. Where there is no fork
-(Windows), jobs are pickled, too. Python files in the working folder never run by themselves.
+(Windows), jobs are pickled, too.
 """
 
 import ctypes
@@ -13,8 +13,9 @@ import sys
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
@@ -27,32 +28,6 @@ CHECKED_EVERY_S = 0.05
 PARENT_CHECKED_EVERY_S = 0.5
 END_WITHIN_S = 5.0  # a child that is to end is killed after this time
 PR_SET_PDEATHSIG = 1
-VARIABLE = "PYTHONSAFEPATH"  # any text: Python searches no module in the working folder
-OWN_VALUE = "nlp-gait"
-
-
-def hide_working_folder() -> None:
-    """Let all child processes search no module in the working folder: ``python -c`` and ``-m`` would search there first."""
-    if not os.environ.get(VARIABLE):
-        os.environ[VARIABLE] = OWN_VALUE
-
-
-def show_working_folder() -> None:
-    """Undo ``hide_working_folder`` for programs that user code starts, which may be Python files with modules next to them."""
-    if os.environ.get(VARIABLE) == OWN_VALUE:
-        del os.environ[VARIABLE]
-
-
-@contextmanager
-def keep_working_folder() -> Iterator[None]:
-    """Return to the working folder at the end, for code that may leave it."""
-    folder = os.open(".", os.O_RDONLY) if os.name == "posix" else os.getcwd()
-    try:
-        yield
-    finally:
-        os.chdir(folder)
-        if isinstance(folder, int):
-            os.close(folder)
 
 
 def has_fork() -> bool:
@@ -151,6 +126,8 @@ def run_jobs(
 
 def _start_worker(context: Any, jobs: Sequence[Job], job: Job) -> _Worker:
     is_fork = context.get_start_method() == "fork"
+    if not is_fork and os.name == "posix":
+        resource_tracker.ensure_running()  # started with the first worker, it would unblock Ctrl-C
     calls = [item.call for item in jobs] if is_fork or not job.alone else {jobs.index(job): job.call}
     try:
         pipe, other = context.Pipe()
@@ -193,7 +170,6 @@ def _serve(pipe: Connection, calls: Any, alone: bool, memory_bytes: int | None, 
 
 def _isolate(memory_bytes: int | None) -> None:
     """Give this process a session, null streams, and at most so much more address space."""
-    show_working_folder()
     if hasattr(os, "setsid"):
         os.setsid()
     if memory_bytes is not None and sys.platform == "linux":

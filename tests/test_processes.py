@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ import pytest
 from nlp_gait import processes
 from nlp_gait.errors import InputError, NoWorkersError, WorkerError
 from nlp_gait.interrupts import never
-from nlp_gait.processes import Job, keep_working_folder, run_alone, run_in_forks, run_jobs
+from nlp_gait.processes import Job, run_alone, run_in_forks, run_jobs
 from tests.faults.processes import ROOT, wait_for
 
 METHODS = [method for method in ("fork", "spawn") if method in multiprocessing.get_all_start_methods()]
@@ -234,15 +234,3 @@ def test_processes_that_cannot_begin_are_one_sentence(
     monkeypatch.setattr(processes.multiprocessing, "get_context", lambda method: context)
     with pytest.raises(NoWorkersError, match=f"cannot begin: {sentence}; use fewer --jobs"):
         list(run_jobs([Job(call=partial(square, 2))]))
-
-
-def test_a_working_folder_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-    def leave() -> Iterator[Path]:
-        with keep_working_folder():
-            os.chdir("/")
-            yield Path.cwd()
-        yield Path.cwd()
-
-    assert list(leave()) == [Path("/"), tmp_path]

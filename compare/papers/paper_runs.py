@@ -23,7 +23,7 @@ from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.kernel.compiled import available_cores, compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result
-from nlp_gait.progress import Progress, ignore_progress
+from nlp_gait.interrupts import Progress, ignore_progress
 
 CLOUD = 50  # most points of a cloud
 

@@ -31,7 +31,7 @@ from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Outcome
-from nlp_gait.progress import Progress
+from nlp_gait.interrupts import Progress
 from nlp_gait.robots.perturbation import list_quantities
 
 # A variable that moves by less than this share of its range over a natural step counts as constant.

@@ -18,7 +18,7 @@ from nlp_gait.backends.identity import identify_problem
 from nlp_gait.decoding import decode_value
 from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.progress import Progress, ignore_progress
+from nlp_gait.interrupts import Progress, ignore_progress
 
 T = TypeVar("T")
 F = TypeVar("F")

@@ -10,8 +10,8 @@ from nlp_gait import __version__
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder, read_json, write_json
+from nlp_gait.interrupts import Progress, ignore_progress
 from nlp_gait.processes import Job, run_jobs
-from nlp_gait.progress import Progress, ignore_progress
 
 Computation = tuple[Mapping[str, Any], Callable[[], Any]]
 """Everything that a result depends on, and the function that computes it, picklable for worker processes."""

@@ -5,6 +5,7 @@ The judge evaluates the point in a process that user code cannot reach.
 """
 
 import math
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -33,7 +34,7 @@ from nlp_gait.backends.solve import make_solution
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.solution import Best
-from nlp_gait.processes import Job, keep_working_folder
+from nlp_gait.processes import Job
 
 Send = Callable[[Any], None]
 Entry = tuple[int, float, float, float]
@@ -216,8 +217,8 @@ def run_search(run: Run, inputs: Inputs, callback: Reporter | None = None) -> Se
     built = time.perf_counter()
     objective = compile_objective(problem, threads=1)  # runs take the processors
     compiled = time.perf_counter()
-    stop = run.stop
-    with keep_working_folder():  # as wrappers of external programs change it
+    stop, folder = run.stop, os.getcwd()
+    try:
         result = minimize(
             objective,
             run.make_search(files),
@@ -227,6 +228,8 @@ def run_search(run: Run, inputs: Inputs, callback: Reporter | None = None) -> Se
             stop=stop.end_early(problem.objective.sign),
             callback=callback,
         )
+    finally:
+        os.chdir(folder)  # wrappers of external programs change it
     history, settings = result.history, describe_settings(result.algorithm)
     settings.pop("command", None)  # of a program: the inputs have it, and it names files
     columns = (history.evaluations, history.violation, history.objective, history.elapsed_s)

@@ -30,7 +30,7 @@ from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError, OutputError, WorkerError
 from nlp_gait.files import convert_errors, lock_folder, make_writable_folder, read_json, write_json
-from nlp_gait.interrupts import Interrupted, count_interrupts, delay_interrupts
+from nlp_gait.interrupts import Interrupted, delay_interrupts
 from nlp_gait.processes import Job, has_fork, run_jobs
 
 FILE, RECORDS = "study.json", "records"
@@ -279,11 +279,7 @@ def _run_here(items: Sequence[Item], workers: int) -> Iterator[tuple[int, RunRec
         is_isolated = run.is_user_code and has_fork()
         movable = has_fork() or isinstance(run.problem.name, str)
         if not is_isolated and (workers == 1 or not movable):
-            with count_interrupts() as presses:
-                record = perform(run, inputs)
-                if presses:  # user code has swallowed it
-                    raise KeyboardInterrupt
-            yield position, record
+            yield position, perform(run, inputs)
             continue
         if is_isolated:
             isolated[len(jobs)] = IsolatedRun(run=run, inputs=inputs)

@@ -27,7 +27,7 @@ from nlp_gait.gaits.biped.walk_sections import GREATEST_SPEED, HALF_STEPS, LEAST
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.gaits.humanoid.turning import list_turn
 from nlp_gait.gaits.nao.body import make_nao
-from nlp_gait.progress import Progress, ignore_progress
+from nlp_gait.interrupts import Progress, ignore_progress
 from nlp_gait.robots.loading import hold_robots
 
 AT_BOUND = 1e-4  # share of a variable's range

@@ -13,7 +13,7 @@ from nlp_gait.backends.kernel.library_cache import find_cache_folder
 from nlp_gait.backends.solve import solve
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
-from nlp_gait.files import make_folder, replace_nan, write_json
+from nlp_gait.files import make_writable_folder, replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe, find_shipped_facts
 from nlp_gait.gaitbench.generated import STARTS, is_generated, parse_id
@@ -55,7 +55,7 @@ def find_facts(instance: Judged) -> Facts:
         return read_dataclass(Facts, path, "stored best known point", error=InputError)
     except InputError:
         facts = compute_facts(instance, parse_id(instance.id)[0].starts if is_generated(instance.id) else STARTS)
-    make_folder(path.parent)
+    make_writable_folder(path.parent)
     write_json(path, replace_nan(asdict(facts)))
     return facts
 

@@ -22,7 +22,7 @@ from nlp_gait.backends.identity import hash_json, identify_problem, make_key
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.progress import Progress, ignore_progress
+from nlp_gait.interrupts import Progress, ignore_progress
 from nlp_gait.proofs.bounds import Bounds, make_bounds
 from nlp_gait.proofs.boxes import halve
 from nlp_gait.proofs.checkpoint import PROVER, Tree, read_checkpoint, write_checkpoint

@@ -15,7 +15,7 @@ from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Outcome, Solution
-from nlp_gait.progress import Progress, ignore_progress
+from nlp_gait.interrupts import Progress, ignore_progress
 
 # The front ends where another hundredth of the criterion would cost ten times the least power.
 LARGEST_TRADE_OFF = 1000.0

@@ -118,9 +118,9 @@ def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_pat
         ("time_s", "inf", "time_s must be a finite number >= 0, got inf"),
         ("violation", -1, "violation must be a finite number >= 0, got -1"),
         ("objective", "-inf", "objective must be a finite number, got -inf"),
-        ("run", 1e300, r"run must be a whole number >= 0 and < 2\^63, got 1e\+300; fix the cell"),
-        ("seed", 2**63, r"seed must be a whole number >= 0 and < 2\^63"),
-        ("evaluations", 1e19, r"evaluations must be a whole number >= 1 and < 2\^63"),
+        ("run", 1e300, r"run must be a whole number >= 0 and <= 2\^53, got 1e\+300; fix the cell"),
+        ("seed", 2**63, r"seed must be a whole number >= 0 and <= 2\^53"),
+        ("evaluations", 1e19, r"evaluations must be a whole number >= 1 and <= 2\^53"),
         ("evaluations", 0, "evaluations must be a whole number >= 1"),
     ],
 )
