@@ -75,7 +75,6 @@ def bench(
         records = run_in_folder(runs, out, effort.jobs, effort.scheduler)
     board = rank_solvers(instances, records, shipped=shipped)
     page = make_leaderboard_page(board, name, chosen.title, effort.evaluations)
-    problems = [{"name": "gaitbench", "options": {"instance": id}} for id in instances]
     rows = [
         (str(k), one.solver, f"{one.mean_rank:.2f}", f"{100 * one.solved:.1f} %", f"{100 * one.feasible:.0f} %")
         for k, one in enumerate(board.standings, start=1)
@@ -91,5 +90,5 @@ def bench(
             "standings": [asdict(standing) for standing in board.standings],
         },
         parts=[table, *page.headline],
-        written=write_document(out, add_origin(page, describe_command(), problems), "leaderboard"),
+        written=write_document(out, add_origin(page, describe_command()), "leaderboard"),
     )

@@ -17,7 +17,6 @@ from compare.cli.printing import Output, Rows, fail
 from compare.judge import Evaluation
 from compare.judge import evaluate as judge
 from compare.study.import_runs import FINALS, read_points
-from nlp_gait.export.formats import write_npz
 from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.files import format_csv, write_text
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
@@ -38,7 +37,6 @@ def evaluate(
     engine: bool = True,
     *,
     problem: AnyProblem,
-    signals: Annotated[Path | None, OUTPUT_FILE] = None,
     table: Annotated[Path | None, Option("--csv"), OUTPUT_FILE] = None,
 ) -> Output:
     """Evaluate candidates with the exact functions, at the problem's samples and on a dense grid.
@@ -47,31 +45,21 @@ def evaluate(
     `nlp-gait evaluate nao-ssp --x points.csv --csv judged.csv`, `nlp-gait evaluate --motion gait.csv --robot nao-v5`
     """
     if motion is not None and x is None:
-        return _evaluate_motion(problem, motion, touch_down, engine, signals)
+        return _evaluate_motion(problem, motion, touch_down, engine)
     if x is None or motion is not None:
         fail("give a point with --x, or a motion with --motion")
     loaded = problem.spec().load()
     many = x.endswith(".csv")
-    if many and signals is not None:
-        fail("--signals takes one candidate; give it as numbers")
-    if signals is not None and loaded.display.motion is None:
-        fail(f"problem {problem.name!r} has no signals")
-    written = [path for path in (signals, table) if path is not None]
     points = read_points(Path(x), loaded, FINALS)[1] if many else [loaded.check_x(parse_numbers("x", x, "--x"))]
     judged = [judge(loaded, point) for point in points]
-    if signals is not None:
-        write_npz(signals, loaded.signals(points[0]))
-    if table is not None:
-        write_text(table, format_csv(_list_cells(judged)))
+    written = [] if table is None else [write_text(table, format_csv(_list_cells(judged)))]
     if not many:
         return Output(data=judged[0].to_json(), parts=[*_describe(judged[0])], written=written)
     data = {"schema": 1, "points": [evaluation.to_json() for evaluation in judged]}
     return Output(data=data, parts=[_tabulate(judged)], written=written)
 
 
-def _evaluate_motion(
-    problem: AnyProblem, motion: Path, touch_down_s: float | None, engine: bool, signals: Path | None
-) -> Output:
+def _evaluate_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None, engine: bool) -> Output:
     """Judge a gait from joint angles, with changed limits; InputError for a file without a gait, or an option without effect."""
     from compare.questions.recorded import judge_gait
     from nlp_gait.gaits.nao.recorded import GAITS, make_recorded_gait
@@ -88,10 +76,7 @@ def _evaluate_motion(
     numbers = {key: parse_number(key, text, "--set") for key, text in values.items()}
     gait = replace(gait, problem=gait.problem.with_values(**numbers))
     judged = judge_gait(gait, in_engine=engine)
-    if signals is not None:
-        write_npz(signals, gait.problem.signals(gait.x))
-    written = [] if signals is None else [signals]
-    return Output(data=judged.to_json(), parts=[*_describe_gait(judged)], written=written)
+    return Output(data=judged.to_json(), parts=[*_describe_gait(judged)])
 
 
 def _describe_gait(judged: JudgedGait) -> Iterator[str | Rows]:

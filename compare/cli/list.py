@@ -33,18 +33,12 @@ def list_problems(
     name: Annotated[str | None, Argument(metavar="[NAME]")] = None,
     robot: Annotated[str | None, Option(metavar="FILE")] = None,
     out: Annotated[Path | None, OUTPUT_FILE] = None,
-    cite: Annotated[bool, Option("--cite")] = False,
 ) -> Output:
     """List problems, algorithms and robots, or describe one of them.
 
-    Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --cite nao-ssp`,
+    Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`,
     `nlp-gait list --robot my_robot.urdf --out my_robot.png`, `nlp-gait list humanoid-cycle --robot my_robot.urdf`
     """
-    if cite:
-        from compare.study.citations import find_citations
-
-        entries = find_citations(name)
-        return Output(data={"entries": entries}, parts=["\n\n".join(entries)])
     if robot is not None and name is None:
         return _describe_robot(robot, out)
     if out is not None:

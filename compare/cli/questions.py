@@ -20,7 +20,6 @@ from compare.report.document import Table, iterate_leaves
 from compare.report.writing import add_origin
 from compare.study.memo import Memo
 from metaheuristics import make_algorithm
-from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import OutputError
 from nlp_gait.formulation import Result
 from nlp_gait.gaits.biped.cycle import SPEED
@@ -167,11 +166,11 @@ def run_question(question: Question[Any], out: Path) -> Output:
             stopped = str(interrupt) or f"interrupted{done}"
     if findings is None:
         return Output(data={}, interrupted=f"{stopped}; {describe_stored(out)}")
-    answer, problems = question.add_best_known(findings), [identify_problem(question.problem)]
+    answer = question.add_best_known(findings)
     written, failures = list[Path](), list[str]()
     with defer_interrupts() as pressed:
         try:
-            written = add_origin(answer, describe_command(), problems).write(out)
+            written = add_origin(answer, describe_command()).write(out)
         except OutputError as error:
             failures.append(str(error))
     if pressed() and not stopped:

@@ -35,7 +35,7 @@ from compare.papers.rules import ClaimRow, Judgement, Ruling, compare_alternativ
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, make_text_table
 from compare.report.interactive import describe_gaits
 from compare.report.provenance import TERMS, format_settings, make_solver_table
-from compare.report.writing import make_citation_section, make_own_version_table, write_document
+from compare.report.writing import make_own_version_table, write_document
 from compare.study.record import format_now, list_versions
 from nlp_gait.files import make_writable_folder, write_json
 from nlp_gait.formulation import GaitProblem, Result
@@ -166,10 +166,9 @@ class Paper(Generic[E, R]):
         tables = (make_solver_table(runner.records),) if runner.records else ()
         origin = (make_text_table(("effort", "value"), settings, prose=True), TERMS, *tables)
         ending = _fold("Versions, machine, seeds and settings", *origin, make_own_version_table(command))
-        cited = make_citation_section(record.inputs.problem for record in runner.records)
         title = self.title if label == "full" else f"{self.title} ({label})"
         opening = Prose("\n\n".join([self.citation, *sentences]).strip())
-        write_document(folder, Document(title=title, parts=(opening, *parts, ending, cited)))
+        write_document(folder, Document(title=title, parts=(opening, *parts, ending)))
         return record
 
     def judge(self, results: Mapping[str, R], effort: E) -> dict[str, dict[str, Judgement]]:

@@ -15,7 +15,7 @@ from compare.drawing.gait_figure import GaitCurves, draw_gaits, make_gait_charts
 from compare.report.document import Figure, Part, Prose, Section, Table, make_table_section, make_text_table
 from compare.report.interactive import describe_gaits
 from compare.report.provenance import TERMS, format_settings, make_solver_table
-from compare.report.writing import escape_markdown, make_anchor, make_citation_section, make_version_table
+from compare.report.writing import escape_markdown, make_anchor, make_version_table
 from compare.study.record import find_best, load_gait, load_problem
 from compare.study.study import StudyFile
 from nlp_gait.errors import GaitError
@@ -233,7 +233,7 @@ def _describe_step(active: ActiveConstraint, unit: str) -> str:
 
 
 def make_settings_section(comparisons: Sequence[Comparison], file: StudyFile) -> Section:
-    """Return what the solvers report, how costs are counted, all settings, versions, citations and terms."""
+    """Return what the solvers report, how costs are counted, all settings, versions and terms."""
     problems = {c.problem: c.records[0].inputs.problem for c in comparisons}
     options = [
         (name, format_settings(problem["parameters"]) or "none", format_settings(problem["options"]))
@@ -253,7 +253,6 @@ def make_settings_section(comparisons: Sequence[Comparison], file: StudyFile) ->
         "gradient run reaches its targets at its end. Times are wall times of "
         "the solve, without building or compiling.",
         make_version_table(file.command, file.date, (r.versions for c in comparisons for r in c.records)),
-        make_citation_section(problems.values()),
         TERMS,
     )
 

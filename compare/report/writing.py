@@ -1,20 +1,19 @@
-"""Documents written as a self-contained HTML page and as Markdown, with figures and tables, session and citations at the end."""
+"""Documents written as a self-contained HTML page and as Markdown, with figures and tables, and versions at the end."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 from compare.drawing.figures import inline_svg
-from compare.report.document import Document, Figure, Part, Prose, Section, Table, iterate_leaves, make_text_table
+from compare.report.document import Document, Figure, Part, Section, Table, iterate_leaves, make_text_table
 from compare.report.provenance import explain
-from compare.study.citations import cite_problems
 from compare.study.record import format_now, list_versions
 from nlp_gait.files import format_csv, write_text
 
@@ -108,17 +107,7 @@ def make_own_version_table(command: str) -> Table:
     return make_version_table(command, format_now(), [list_versions()])
 
 
-def make_citation_section(problems: Iterable[Mapping[str, Any]]) -> Section:
-    """Return how to cite the software and the sources of problems, given by name and options."""
-    words = "The software and the papers whose problems are used here; `nlp-gait list --cite` prints these entries:"
-    entries = f"```bibtex\n{cite_problems(problems)}\n```"
-    return Section(title="How to cite", parts=(Prose(f"{words}\n\n{entries}"),))
-
-
-def add_origin(document: D, command: str, problems: Iterable[Mapping[str, Any]]) -> D:
-    """Return a document with this command, machine and versions, and what to cite."""
-    ending = (
-        Section(title="Versions", parts=(make_own_version_table(command),)),
-        make_citation_section(problems),
-    )
-    return replace(document, parts=(*document.parts, *ending))
+def add_origin(document: D, command: str) -> D:
+    """Return a document with this command, machine and versions at its end."""
+    ending = Section(title="Versions", parts=(make_own_version_table(command),))
+    return replace(document, parts=(*document.parts, ending))

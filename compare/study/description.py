@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from compare.study.citations import split_sections
 from compare.study.run import list_solvers
 from metaheuristics.multi_objective import FRONT_ALGORITHMS
 from metaheuristics.registry import ADAPTERS, ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS
 
 FIELD = re.compile(r"^    (\w+):")
+SECTION = re.compile(r"^(Attributes|Args|Raises|Returns|Source):$")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +48,7 @@ def describe_solver(name: str) -> Description:
     kind: Any = factory.func if isinstance(factory, partial) else factory
     # A class may inherit the documentation of its settings and its source.
     bases = list(reversed(kind.__mro__[:-1]))
-    sections = {k: text for base in bases for k, text in split_sections(base.__doc__ or "")}
+    sections = {k: text for base in bases for k, text in _split_sections(base.__doc__ or "")}
     meanings = {name: text for base in bases for name, text in _read_fields(base)}
     parameters = inspect.signature(kind).parameters.values()
     settings = tuple(
@@ -62,6 +62,18 @@ def describe_solver(name: str) -> Description:
         settings=settings,
         source=" ".join(sections.get("Source", "").replace("``", "`").split()),
     )
+
+
+def _split_sections(text: str) -> Iterator[tuple[str, str]]:
+    """Yield the sections of a Google docstring with their headings; the first has none."""
+    heading, lines = "", list[str]()
+    for line in inspect.cleandoc(text).splitlines():
+        if title := SECTION.match(line):
+            yield heading, "\n".join(lines).strip("\n")
+            heading, lines = title[1], []
+        else:
+            lines.append(line)
+    yield heading, "\n".join(lines).strip("\n")
 
 
 def _read_fields(kind: type) -> Iterator[tuple[str, str]]:

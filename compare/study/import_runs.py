@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -23,10 +22,11 @@ from nlp_gait.formulation import Array, GaitProblem
 # Table next to the variables.
 FINALS = ("run", "seed", "objective", "violation", "evaluations", "time_s")
 HISTORY = ("run", "evaluations", "objective")
-MOST_POINTS = 100_000
 ROUNDED = 1e-3  # relative difference of a history's end from the judged value that printed digits explain
 SAMPLES = 100  # random points and corners among those that round to printed digits
 FEW_DIGITS = 10  # of a printed number; more are exact for all that is judged
+Entry = tuple[int, float | None, float]
+"""Evaluations, best objective and seconds so far."""
 # Least values of those that are numbers, not counts.
 LEAST = {"objective": -math.inf, "violation": 0.0, "time_s": 0.0}
 
@@ -48,10 +48,6 @@ def read_points(path: Path, problem: GaitProblem, others: Sequence[str] = ()) ->
         raise InputError(
             f"{table.owner} has {table.width} columns and no header; {problem.name} has {len(problem.names)} variables: "
             f"{', '.join(problem.names)}"
-        )
-    if len(table.rows) > MOST_POINTS:
-        raise InputError(
-            f"{table.owner} has {len(table.rows)} rows; at most {MOST_POINTS} are read at once: split the file"
         )
     points = np.array(table.rows, dtype=float)[:, order]
     for line, x in zip(table.lines, points, strict=True):
@@ -88,7 +84,7 @@ def import_runs(
     runs = [table.count("run", k, v) for k, v in enumerate(given["run"] or range(len(points)))]
     if len(set(runs)) < len(runs):
         raise InputError(f"{table.owner}: a run is duplicated")
-    stored = {} if histories is None else _read_histories(histories, runs)
+    courses = {} if histories is None else _read_histories(histories, runs)
     identity = identify_problem(problem)
     bound = find_reference(identity).bound
     records = []
@@ -98,31 +94,33 @@ def import_runs(
         judged = describe_evaluation(evaluate(problem, x, prove=False))
         for name, least in LEAST.items():
             table.number(name, k, row[name], least)
-        history, seconds = stored.get(run) or _make_history(table, k, row, judged, evaluations)
-        history, seconds, cut = _cut_history(problem.objective.sign, history, seconds, judged, bound)
+        course = courses.get(run, [])
+        count = evaluations if math.isnan(row["evaluations"]) else table.count("evaluations", k, row["evaluations"], 1)
+        if not course and count is not None:  # the end of the run alone
+            course = [(count, judged["objective"] if judged["feasible"] else None, row["time_s"])]
+        course, cut = _cut_course(problem.objective.sign, course, judged, bound)
+        counts, objectives, seconds = zip(*course, strict=True) if course else ((), (), ())
+        history = History(evaluations=counts, objective=objectives)
         solve = (time for time in (row["time_s"], *seconds[-1:]) if not math.isnan(time))
         reported = None if math.isnan(row["objective"]) else row["objective"]
         seed = run if math.isnan(row["seed"]) else table.count("seed", k, row["seed"])
-        content = [x.tolist(), {name: repr(value) for name, value in row.items()}, asdict(history), repr(seconds)]
+        content = [x.tolist(), {name: repr(value) for name, value in row.items()}, repr(course)]
+        inputs = Inputs(
+            problem=identity, objective=problem.objective, solver=label, seed=seed, imported=hash_json(content)
+        )
         records.append(
             RunRecord(
                 problem=spec.title,
                 solver=label,
                 run=run,
-                inputs=Inputs(
-                    problem=identity,
-                    objective=problem.objective,
-                    solver=label,
-                    seed=seed,
-                    imported=hash_json(content),
-                ),
+                inputs=inputs,
                 settings={"kind": "imported", "file": finals.name},
                 status=f"imported from {finals.name}{note}{cut}",
                 reported_feasible=reported is not None and not row["violation"] > 0.0,
                 x=problem.by_name(x),
                 reported_objective=reported,
                 **judged,
-                counts={"f": history.evaluations[-1]} if history.evaluations else {},
+                counts={"f": counts[-1]} if counts else {},
                 history=history,
                 time_s=Times(solve=next(solve, math.nan), history=seconds),
                 versions=list_versions(),
@@ -160,78 +158,53 @@ def find_feasible(problem: GaitProblem, printed: Sequence[str]) -> Array | None:
     return None
 
 
-def _make_history(
-    table: CsvTable, k: int, row: Mapping[str, float], judged: Mapping[str, Any], evaluations: int | None
-) -> tuple[History, tuple[float, ...]]:
-    """Return the end of a run alone as its history and its time; empty if the number of evaluations is unknown."""
-    count = row["evaluations"]
-    if math.isnan(count):
-        if evaluations is None:
-            return History(), ()
-        count = evaluations
-    end = judged["objective"] if judged["feasible"] else None
-    return History(evaluations=(table.count("evaluations", k, count, 1),), objective=(end,)), (row["time_s"],)
-
-
-def _cut_history(
-    sign: float, history: History, seconds: tuple[float, ...], judged: Mapping[str, Any], bound: float | None
-) -> tuple[History, tuple[float, ...], str]:
-    """Return a history without values that its run cannot have had, and a sentence about them.
+def _cut_course(
+    sign: float, course: list[Entry], judged: Mapping[str, Any], bound: float | None
+) -> tuple[list[Entry], str]:
+    """Return a course without values that its run cannot have had, and a sentence about them.
 
     No value may be better than the run's judged end, beyond the digits of imported files, or than a proven bound.
     """
-    end = judged["objective"] if judged["feasible"] else math.nan
-    best = sign * end - ROUNDED * abs(end) if judged["feasible"] else math.inf
-    least = best if bound is None else max(best, sign * bound - SAME_VALUE * abs(bound))
-    wrong = [k for k, value in enumerate(history.objective) if value is not None and sign * value < least]
-    if not wrong:
-        return history, seconds, ""
-    kept = [k for k in range(len(history.objective)) if k not in set(wrong)]
-    cut = History(
-        evaluations=tuple(history.evaluations[k] for k in kept), objective=tuple(history.objective[k] for k in kept)
-    )
-    count, why = (
-        len(wrong),
-        "better than its point, or than the proven bound" if judged["feasible"] else "of no feasible point",
-    )
-    last = (history.evaluations[-1], end if judged["feasible"] else None)
-    if kept[-1:] != [len(history.objective) - 1]:  # its length stays, and its end is the judged one
-        cut = History(evaluations=(*cut.evaluations, last[0]), objective=(*cut.objective, last[1]))
-        kept.append(len(history.objective) - 1)
-    return cut, tuple(seconds[k] for k in kept), f"; {count} value{'s' * (count > 1)} of its history left out: {why}"
+    end = judged["objective"] if judged["feasible"] else None
+    least = math.inf if end is None else sign * end - ROUNDED * abs(end)
+    if bound is not None:
+        least = max(least, sign * bound - SAME_VALUE * abs(bound))
+    kept = [entry for entry in course if entry[1] is None or sign * entry[1] >= least]
+    if not (count := len(course) - len(kept)):
+        return course, ""
+    if kept[-1:] != course[-1:]:  # its length stays, and its end is the judged one
+        kept.append((course[-1][0], end, course[-1][2]))
+    why = "of no feasible point" if end is None else "better than its point, or than the proven bound"
+    return kept, f"; {count} value{'s' * (count > 1)} of its history left out: {why}"
 
 
-def _read_histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tuple[float, ...]]]:
+def _read_histories(path: Path, runs: Sequence[int]) -> dict[int, list[Entry]]:
     table = read_table(path, "history")
     table.check_header(HISTORY, ("time_s",))
     columns = [table.column(name) or () for name in HISTORY]
     seconds = table.column("time_s") or (math.nan,) * len(table.rows)
-    entries_by_run: dict[int, list[tuple[int, float | None, float]]] = {}
+    courses: dict[int, list[Entry]] = {}
     for k, (run, count, value, time) in enumerate(zip(*columns, seconds, strict=True)):
-        entries = entries_by_run.setdefault(table.count("run", k, run), [])
+        course = courses.setdefault(table.count("run", k, run), [])
         evaluations = table.count("evaluations", k, count, 1)
-        if entries and evaluations < entries[-1][0]:
+        if course and evaluations < course[-1][0]:
             raise InputError(f"{table.owner}, line {table.lines[k]}: evaluations of run {run:g} must ascend")
         table.number("objective", k, value)
-        least = entries[-1][2] if entries and not math.isnan(entries[-1][2]) else 0.0
+        least = course[-1][2] if course and not math.isnan(course[-1][2]) else 0.0
         table.number("time_s", k, time, least)
-        entries.append((evaluations, None if math.isnan(value) else value, time))
-    for run in entries_by_run:
-        if run not in runs:
-            raise InputError(f"{table.owner}: run {run} has no final point")
-    missing = [run for run in runs if run not in entries_by_run]
-    if missing:
-        raise InputError(f"{table.owner}: run {missing[0]} has no history")
-    courses = {run: zip(*entries, strict=True) for run, entries in entries_by_run.items()}
-    return {run: (History(evaluations=counts, objective=f), times) for run, (counts, f, times) in courses.items()}
+        course.append((evaluations, None if math.isnan(value) else value, time))
+    for run in courses.keys() ^ set(runs):
+        raise InputError(f"{table.owner}: run {run} has no {'final point' if run in courses else 'history'}")
+    return courses
 
 
 def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> list[RunRecord]:
     """Return the imported records in a folder whose problems are those of some records."""
     problems = {record.problem: record.inputs.problem for record in records}
+    stored = read_records(folder)[0] if read_study_file(folder).runs else []
     return [
         record
-        for record in (read_records(folder)[0] if read_study_file(folder).runs else ())
+        for record in stored
         if record.inputs.imported
         and record.problem in problems
         and not describe_difference(record.inputs.problem, problems[record.problem])

@@ -1,7 +1,8 @@
 """Results of long computations in a folder, so that a command that is rerun continues."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -46,17 +47,16 @@ class Memo:
         """Return results by name from their inputs and functions; the missing ones are computed by ``jobs`` processes."""
         paths = {name: self._locate(name, inputs) for name, (inputs, _) in computations.items()}
         stored = {name: _read(path) for name, path in paths.items()}
-        values = {name: content[0] for name, content in stored.items() if content}
+        values = {name: content["result"] for name, content in stored.items() if "result" in content}
         for name in values:
             progress(f"{name}: stored by an earlier run")
         missing = [name for name in computations if name not in values]
+        calls = [partial(_call, computations[name][1]) for name in missing]
         if jobs == 1 or len(missing) < 2:
-            for name in missing:
-                values[name] = _store(paths[name], computations[name][1]())
-                progress(name)
-            return values
-        calls = [Job(call=partial(_call, computations[name][1])) for name in missing]
-        for number, result in run_jobs(calls, jobs):
+            results: Iterable[tuple[int, Any]] = ((number, call()) for number, call in enumerate(calls))
+        else:
+            results = run_jobs([Job(call=call) for call in calls], jobs)
+        for number, result in results:
             if isinstance(result, BaseException):
                 raise result
             values[missing[number]] = _store(paths[missing[number]], result)
@@ -68,18 +68,16 @@ class Memo:
         return None if self.folder is None else self.folder / f"{name}-{key}.json"
 
 
-def _call(function: Callable[[], Any], _: object) -> Any:
+def _call(function: Callable[[], Any], _: object = None) -> Any:
     return function()
 
 
-def _read(path: Path | None) -> list[Any]:
-    """Return a list of the stored value; empty if it is not stored, or its file is damaged."""
-    if path is None or not path.exists():
-        return []
-    try:
-        return [read_json(path, "result")["result"]]
-    except (InputError, TypeError, KeyError):
-        return []
+def _read(path: Path | None) -> Mapping[str, Any]:
+    """Return the content of a file; empty if there is none, or it is damaged."""
+    with suppress(InputError):
+        content = read_json(path, "result") if path is not None and path.exists() else None
+        return content if isinstance(content, dict) else {}
+    return {}
 
 
 def _store(path: Path | None, value: Any) -> Any:

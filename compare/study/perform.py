@@ -25,6 +25,7 @@ from compare.study.record import (
     list_versions,
 )
 from compare.study.run import IPOPT, Inputs, Run, describe_settings
+from metaheuristics import EarlyStop
 from metaheuristics.interface import FEASIBILITY
 from metaheuristics.minimize import minimize
 from metaheuristics.registry import make_handling
@@ -41,7 +42,6 @@ Entry = tuple[int, float, float, float]
 """Evaluations, violation and objective of the best point, which is minimised, and seconds."""
 
 MOST_REASON = 500  # characters of an error in a record
-MOST_HISTORY = 10_000  # entries of a history in a record, some 60 bytes each
 # A run that respects its budget and its time limit ends within them; its process is killed this long after either.
 GRACE_S = 5.0
 REPORTED_EVERY_S = 0.2
@@ -107,8 +107,6 @@ class IsolatedRun:
         entries, self.latest.failed = self.latest.entries, failed
         if not entries:  # the clock starts with the search
             self.deadline = time.monotonic() - entry[3] + self._allowed_s
-        if len(entries) > 1 and entries[-2][1:3] == entries[-1][1:3]:
-            entries.pop()  # a count without a better point
         entries.append(entry)
         if x is not None:
             self.latest.x = x
@@ -128,26 +126,21 @@ class IsolatedRun:
 
     def conclude(self, result: Any) -> RunRecord:
         """Return the record of what the process returned, or of its error."""
-        if isinstance(result, ChangedFileError):
-            raise result
-        end = result
-        if isinstance(result, TimeoutError) and self.latest.entries:
-            used = self.latest.entries[-1][0] >= self.run.stop.evaluations
-            why = "evaluation budget used" if used else "time limit reached"
-            last = self.latest.entries[-1]
-            end = replace(
-                self.latest,
-                status=f"{why}; the search did not return and was ended",
-                settings={"kind": "user code"},
-                time_s=Times(build=0.0, compile=0.0, solve=last[3], objective=math.nan),
+        stop, latest = self.run.stop, self.latest
+        if isinstance(result, TimeoutError) and latest.entries:
+            count, _, _, seconds = latest.entries[-1]
+            why = "evaluation budget used" if count >= stop.evaluations else "time limit reached"
+            latest.status = f"{why}; the search did not return and was ended"
+            result = replace(
+                latest, settings={"kind": "user code"}, time_s=Times(build=0.0, compile=0.0, solve=seconds)
             )
-        if not isinstance(end, SearchEnd):
-            limit = self.run.stop.time_limit_s
-            reason = f"it evaluated nothing within its time limit of {limit} s"
-            if not isinstance(result, TimeoutError):
-                reason = result if isinstance(result, str) else describe_error(result)
-            return make_failed(self.run, self.inputs, reason)
-        return catch_errors(self.run, self.inputs, lambda: judge_search(self.run, self.inputs, end))
+        elif isinstance(result, TimeoutError):
+            result = f"it evaluated nothing within its time limit of {stop.time_limit_s} s"
+        elif isinstance(result, BaseException):
+            result = describe_error(result)
+        if isinstance(result, str):
+            return make_failed(self.run, self.inputs, result)
+        return catch_errors(self.run, self.inputs, lambda: judge_search(self.run, self.inputs, result))
 
 
 def perform(run: Run, inputs: Inputs, _: Send | None = None) -> RunRecord:
@@ -225,7 +218,7 @@ def run_search(run: Run, inputs: Inputs, callback: Reporter | None = None) -> Se
             evaluations=stop.evaluations,
             seed=run.run_seed,
             handling=make_handling(run.handling.name, **run.handling.settings),
-            stop=stop.end_early(problem.objective.sign),
+            stop=EarlyStop(time_limit_s=stop.time_limit_s),
             callback=callback,
         )
     finally:
@@ -251,7 +244,7 @@ def judge_search(run: Run, inputs: Inputs, end: SearchEnd) -> RunRecord:
     problem = run.problem.load()
     sign, (evaluations, violation, objective, _) = problem.objective.sign, end.entries[-1]
     best = [sign * f if v == 0.0 and math.isfinite(f) else None for _, v, f, _ in end.entries]
-    kept = choose_entries(best)
+    kept = find_changes(best)
     return make_record(
         run,
         inputs,
@@ -269,12 +262,9 @@ def judge_search(run: Run, inputs: Inputs, end: SearchEnd) -> RunRecord:
     )
 
 
-def choose_entries(best: Sequence[float | None]) -> list[int]:
-    """Return which entries of a history to keep: all, or of a long one the changes, evenly thinned, and the last entry."""
-    if len(best) <= MOST_HISTORY:
-        return list(range(len(best)))
-    changes = [k for k in range(len(best)) if k == 0 or best[k] != best[k - 1]]
-    return sorted({*changes[:: math.ceil(len(changes) / MOST_HISTORY)], len(best) - 1})
+def find_changes(best: Sequence[float | None]) -> list[int]:
+    """Return which entries of a history tell all of it: the first one, those with another best value, and the last one."""
+    return [k for k in range(len(best)) if k in (0, len(best) - 1) or best[k] != best[k - 1]]
 
 
 def run_solver(run: Run, inputs: Inputs) -> RunRecord:
@@ -292,7 +282,7 @@ def run_solver(run: Run, inputs: Inputs) -> RunRecord:
     # A solver that keeps no history has its end.
     end = Best(outcome.evaluations.f, outcome.objective if outcome.claimed else None, outcome.time_s)
     course = outcome.history or (end,)
-    history = [course[k] for k in choose_entries([best.objective for best in course])]
+    history = [course[k] for k in find_changes([best.objective for best in course])]
     judged = describe_evaluation(evaluate(problem, outcome.x, prove=False))
     return make_record(
         run,

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from metaheuristics import EarlyStop
 from metaheuristics.external_program import ExternalProgram
 from metaheuristics.interface import Algorithm
 from metaheuristics.preparation import check_budget
@@ -47,8 +46,6 @@ LABEL = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9._+:() -]{0,62}[A-Za-z0-9._+:()-])
 PYMOO = "pymoo:"  # prefix of names that are not user code
 FUNCTION = "function"  # kind of a plain function in settings
 KEY_DIGITS = 16
-# Replaces a user-defined solver in checks before its code runs.
-UNREAD: Any = PlainFunction(function=lambda f, lower, upper, evaluations, seed: None, name="own")
 
 
 def list_solvers() -> tuple[str, ...]:
@@ -123,19 +120,12 @@ class Stop:
     """When a run ends."""
 
     evaluations: int = 10_000  #: budget of a search and of SLSQP; other NLP solvers end by themselves
-    target: float | None = None  #: feasible objective that ends a search, in the problem's sense
-    stagnation: int | None = None  #: generations without improvement that end a search
     time_limit_s: float | None = None  #: wall time [s]
 
     @property
     def limits(self) -> dict[str, int | float]:
         """Criteria that are set, by name."""
         return {name: value for name, value in asdict(self).items() if value is not None}
-
-    def end_early(self, sign: float) -> EarlyStop:
-        """Return what ends a search of a problem, whose objective is minimised (sign 1) or maximised (-1), before its budget."""
-        target = None if self.target is None else sign * self.target
-        return EarlyStop(target=target, stagnation=self.stagnation, time_limit_s=self.time_limit_s)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -313,9 +303,8 @@ def check_run(run: Run) -> None:
         run.make_solver().check(problem)
     else:
         make_handling(run.handling.name, **run.handling.settings)
-        search = UNREAD if run.is_user_code else run.make_search()
-        check_budget(search, run.stop.evaluations)
-        run.stop.end_early(1.0)
+        if not run.is_user_code:
+            check_budget(run.make_search(), run.stop.evaluations)
     if run.start:
         if run.is_search:
             raise InputError(f"search {run.title!r} takes no start point; only NLP solvers do")
@@ -349,7 +338,8 @@ def describe_settings(settings: Any) -> dict[str, Any]:
     kind = type(settings).__name__
     plain = is_dataclass(settings) and not isinstance(settings, type)
     values = asdict(settings) if plain else {k: v for k, v in getattr(settings, "__dict__", {}).items() if k[0] != "_"}
-    return {"kind": kind, **{name: _encode_setting(value) for name, value in values.items()}}
+    encoded: dict[str, Any] = json.loads(json.dumps(values, default=_encode_setting, skipkeys=True))
+    return {"kind": kind, **encoded}
 
 
 def _hash_source(solver: object) -> dict[str, str]:
@@ -365,11 +355,5 @@ def _hash_source(solver: object) -> dict[str, str]:
 
 
 def _encode_setting(value: Any) -> Any:
-    """Return a value as JSON has it, or the name of its type."""
-    if isinstance(value, Mapping):
-        return {str(key): _encode_setting(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_encode_setting(inner) for inner in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return value if value is None or isinstance(value, (str, int, float)) else f"<{type(value).__name__}>"
+    """Return what JSON has no form for: a number of NumPy as a number, and of anything else the name of its type."""
+    return value.item() if isinstance(value, np.generic) else f"<{type(value).__name__}>"

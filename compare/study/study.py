@@ -7,7 +7,6 @@ the study; other records stay and are not read.
 
 import logging
 import os
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -160,18 +159,15 @@ class Study:
             raise InputError(f"jobs must be at least 1, got {self.jobs}")
         if not self.runs:
             raise InputError("a study needs at least one problem, one solver and one run")
-        specs: dict[str, ProblemSpec] = {}
+        specs, names = dict[str, ProblemSpec](), set[tuple[str, str, int]]()
         for run in self.runs:
-            if specs.setdefault(run.problem.title, run.problem) != run.problem:
-                raise InputError(
-                    f"two problems of the study are called {run.problem.title!r}; give them different labels"
-                )
-        names = Counter((run.problem.title, run.title, run.number) for run in self.runs)
-        (problem, solver, _), count = names.most_common(1)[0]
-        if count > 1:
-            raise InputError(
-                f"two solvers of the study are called {solver!r} on {problem!r}; give them different labels"
-            )
+            problem, solver = run.problem.title, run.title
+            remedy = "give them different labels"
+            if specs.setdefault(problem, run.problem) != run.problem:
+                raise InputError(f"two problems of the study are called {problem!r}; {remedy}")
+            if (problem, solver, run.number) in names:
+                raise InputError(f"two solvers of the study are called {solver!r} on {problem!r}; {remedy}")
+            names.add((problem, solver, run.number))
 
     def __repr__(self) -> str:
         problems, solvers = dict.fromkeys(r.problem.title for r in self.runs), dict.fromkeys(r.title for r in self.runs)

@@ -9,17 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from compare.papers import REPRODUCTIONS, load_reproduction
-from compare.study.citations import find_citations
 from docs.pages.markdown import literal, page, table, write_all
 
 RECORDS = Path(__file__).parents[1] / "papers"
 
 
 def write(folder: Path) -> None:
-    """Write the tables of each paper, the list of papers, and what to cite, which the pages include."""
-    entries = "\n\n".join(find_citations())
+    """Write the tables of each paper and the list of papers, which the pages include."""
     pages = {f"{name}.md": paper_page(name) for name in REPRODUCTIONS}
-    write_all(folder / "papers", {**pages, "index.md": list_page(), "citations.md": page(f"```text\n{entries}\n```")})
+    write_all(folder / "papers", {**pages, "index.md": list_page()})
 
 
 def read_record(name: str) -> dict[str, Any]:

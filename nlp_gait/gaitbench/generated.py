@@ -136,7 +136,9 @@ def define(id: str) -> Definition:
         problem = load(id)
         if not problem.searchable and len(problem.names) > MOST_VARIABLES:
             raise InputError(f"{id} has {len(problem.names)} variables tied by equations, which no search can satisfy")
-        return Definition(id=id, what=problem.title, problem=id, difficulty="medium", source="see nlp-gait list --cite")
+        return Definition(
+            id=id, what=problem.title, problem=id, difficulty="medium", source=f"problem {id} of this package"
+        )
     return draw_definition(id) if is_generated(id) else get_definition(id)
 
 

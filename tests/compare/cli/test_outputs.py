@@ -52,7 +52,6 @@ def test_no_command_writes_over_its_input(call: str, name: str, folder: Path) ->
         ("evaluate walk12 --x p.csv --csv {}", "notes.csv"),
         ("export w.json --to json --out {}", "notes.json"),
         ("solve byo.py:two_link --starts 1 --out {}", "notes.json"),
-        (f"evaluate walk12 {X} --signals {{}}", "notes.npz"),
         ("export walk12-w100 --to objective --out .", "gaitbench_walk12_w100.cpp"),
     ],
 )

@@ -78,4 +78,3 @@ def test_a_certificate_without_time_for_a_finite_bound_says_so(tmp_path: Path) -
     assert data["certificate"]["bound"] is None and data["certificate"]["closed"] is False
     page = (tmp_path / "walk12-certainty.md").read_text()
     assert "Best known value: 0.970835 (shipped, proven to six digits)" in page
-    assert "{Goswami2008," in page.split("How to cite")[1]

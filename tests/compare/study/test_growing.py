@@ -41,7 +41,6 @@ def test_more_runs_solvers_and_problems_continue_what_is_there(tmp_path: Path) -
 
 CHANGES: dict[str, dict[str, Any]] = {
     "budget": {"stop": Stop(evaluations=300)},
-    "target": {"stop": Stop(evaluations=200, target=0.99)},
     "seed": {"seed": 7},
     "handling": {"handling": Handling(name="epsilon")},
     "settings": {"solvers": [("pso", ParticleSwarm(population=20))]},
@@ -71,7 +70,7 @@ def test_a_gradient_run_depends_only_on_what_it_heeds() -> None:
     def find(solver: str, **stop: Any) -> str:
         return find_key(Run(problem=WALK, solver=solver, stop=Stop(**stop)))
 
-    assert find("ipopt", evaluations=300) == find("ipopt", evaluations=400, target=0.5)
+    assert find("ipopt", evaluations=300) == find("ipopt", evaluations=400)
     assert find("ipopt", time_limit_s=9.0) != find("ipopt")
     assert find("slsqp", evaluations=300) != find("slsqp", evaluations=400)
 
