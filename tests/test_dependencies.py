@@ -21,7 +21,6 @@ LAYERS = (
     "nlp_gait.files",
     "nlp_gait.columns",
     "nlp_gait.decoding",
-    "nlp_gait.option_groups",
     "nlp_gait.user_code",
     "nlp_gait.robots",
     "nlp_gait.symbolic",

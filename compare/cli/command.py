@@ -25,10 +25,10 @@ import typer
 from typer.models import ParameterInfo
 
 from compare.cli.printing import Output, fail, print_output, say_error
+from nlp_gait.decoding import find_groups, list_options, pack_options, replace_signature
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import check_output
 from nlp_gait.interrupts import raise_interrupts
-from nlp_gait.option_groups import find_groups, list_options, pack_options, replace_signature
 
 # In the annotation of a parameter that names the folder, or the file, that the command writes.
 OUTPUT, OUTPUT_FILE = "output", "output file"

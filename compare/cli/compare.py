@@ -1,7 +1,6 @@
 """``nlp-gait compare``."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,23 +28,13 @@ ALGORITHMS, STARTS = "pso,ga,aco", 20
 ALL, ALL_GRADIENT = "all", (IPOPT, "slsqp")
 
 
-@dataclass(frozen=True, kw_only=True)
-class SearchOptions:
-    """Number of runs of search algorithms, constraint handling, and stop criteria."""
-
-    runs: options.Runs = 11
-    seed: options.Seed = 0
-    evaluations: options.Evaluations = 10_000
-    handling: str = "deb"
-    time_limit: Annotated[float | None, Option(min=0.001, max=1000000000.0)] = None
-
-    def make_handling(self) -> Handling:
-        """Return the constraint handling; raises InputError unless a penalty has a weight."""
-        name, _, weight = self.handling.partition("=")
-        if (name == "penalty") != bool(weight):
-            raise InputError("--handling penalty=WEIGHT has a weight, others none; no weight suits every problem")
-        settings = {"weight": options.parse_number("the weight", weight, "--handling")} if weight else {}
-        return Handling(name=name, settings=settings)
+def parse_handling(text: str) -> Handling:
+    """Return a constraint handling; raises InputError unless a penalty has a weight."""
+    name, _, weight = text.partition("=")
+    if (name == "penalty") != bool(weight):
+        raise InputError("--handling penalty=WEIGHT has a weight, others none; no weight suits every problem")
+    settings = {"weight": options.parse_number("the weight", weight, "--handling")} if weight else {}
+    return Handling(name=name, settings=settings)
 
 
 def list_solver_names(algorithms: str, starts: int) -> list[str]:
@@ -65,7 +54,11 @@ def compare(
     problems: Annotated[list[str] | None, Argument(metavar="[PROBLEM]...")] = None,
     algorithms: str = ALGORITHMS,
     starts: Annotated[int, Option(min=0, max=100000)] = STARTS,
-    searches: SearchOptions,
+    runs: options.Runs = 11,
+    seed: options.Seed = 0,
+    evaluations: options.Evaluations = 10_000,
+    handling: str = "deb",
+    time_limit: Annotated[float | None, Option(min=0.001, max=1000000000.0)] = None,
     changes: options.ProblemOptions,
     out: Annotated[Path, OUTPUT] = options.RESULTS,
     jobs: options.Jobs = None,
@@ -80,16 +73,16 @@ def compare(
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --out study`,
     `nlp-gait compare nao-ssp --algorithms pso --starts 0 --runs 1`
     """
-    runs = plan_runs(
+    planned = plan_runs(
         [changes.make_spec(name) for name in problems or DEFAULT_PROBLEMS],
         [("", name) for name in list_solver_names(algorithms, starts)],
-        runs=searches.runs,
+        runs=runs,
         starts=starts,
-        handling=searches.make_handling(),
-        stop=Stop(evaluations=searches.evaluations, time_limit_s=searches.time_limit),
-        seed=searches.seed,
+        handling=parse_handling(handling),
+        stop=Stop(evaluations=evaluations, time_limit_s=time_limit),
+        seed=seed,
     )
-    records = run_in_folder(runs, out, jobs, scheduler)
+    records = run_in_folder(planned, out, jobs, scheduler)
     records += read_imported_records(out, records)
     written = write_report(out, records, read_study_file(out))
     comparisons = compare_problems(records, folder=out)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from importlib.resources import files
@@ -66,19 +65,10 @@ def _describe_algorithm(algorithm: Description) -> Iterator[str | Rows]:
         yield f"Source: {algorithm.source}\n"
 
 
-def _belongs_here(record: logging.LogRecord) -> bool:
-    return "see nlp-gait list --robot" not in record.getMessage()
-
-
 def _describe_robot(name: str, target: Path | None) -> Output:
     from nlp_gait.gaits.humanoid.body import JOINT_COLUMNS, describe_humanoid, list_joints, make_humanoid
 
-    log = logging.getLogger("nlp_gait")
-    log.addFilter(_belongs_here)  # what it refers to is printed below
-    try:
-        body = make_humanoid(name)
-    finally:
-        log.removeFilter(_belongs_here)
+    body = make_humanoid(name)
     facts, notes, title = describe_humanoid(body), body.biped.full.notes, body.biped.full.name
     written = []
     if target is not None:

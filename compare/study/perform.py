@@ -241,30 +241,37 @@ def run_search(run: Run, inputs: Inputs, callback: Reporter | None = None) -> Se
 
 def judge_search(run: Run, inputs: Inputs, end: SearchEnd) -> RunRecord:
     """Return the record of a search, whose best point is judged."""
-    problem = run.problem.load()
-    sign, (evaluations, violation, objective, _) = problem.objective.sign, end.entries[-1]
-    best = [sign * f if v == 0.0 and math.isfinite(f) else None for _, v, f, _ in end.entries]
-    kept = find_changes(best)
-    return make_record(
+    sign, (evaluations, violation, objective, _) = inputs.objective.sign, end.entries[-1]
+    course = [Best(n, sign * f if v == 0.0 and math.isfinite(f) else None, s) for n, v, f, s in end.entries]
+    return judge_run(
         run,
         inputs,
-        replace(end.time_s, history=tuple(end.entries[k][3] for k in kept)),
+        course,
+        end.x,
+        end.time_s,
         status=end.status,
         settings=end.settings,
         reported_feasible=violation == 0.0,
         reported_objective=sign * objective if math.isfinite(objective) else None,
-        x=problem.by_name(end.x),
-        **describe_evaluation(evaluate(problem, end.x, prove=False)),
         counts={"f": evaluations},
         failed_evaluations=end.failed,
         iterations=end.generations,
-        history=History(evaluations=tuple(end.entries[k][0] for k in kept), objective=tuple(best[k] for k in kept)),
     )
 
 
-def find_changes(best: Sequence[float | None]) -> list[int]:
-    """Return which entries of a history tell all of it: the first one, those with another best value, and the last one."""
-    return [k for k in range(len(best)) if k in (0, len(best) - 1) or best[k] != best[k - 1]]
+def judge_run(run: Run, inputs: Inputs, course: Sequence[Best], x: Array, time_s: Times, **results: Any) -> RunRecord:
+    """Return the record of a run that ends at x (n,): of its course the first entry, each change, and the last one."""
+    problem, last = run.problem.load(), len(course) - 1
+    kept = [b for k, b in enumerate(course) if k in (0, last) or b.objective != course[k - 1].objective]
+    return make_record(
+        run,
+        inputs,
+        replace(time_s, history=tuple(best.time_s for best in kept)),
+        x=problem.by_name(x),
+        history=History(evaluations=tuple(b.calls for b in kept), objective=tuple(b.objective for b in kept)),
+        **describe_evaluation(evaluate(problem, x, prove=False)),
+        **results,
+    )
 
 
 def run_solver(run: Run, inputs: Inputs) -> RunRecord:
@@ -281,29 +288,17 @@ def run_solver(run: Run, inputs: Inputs) -> RunRecord:
     solution = make_solution(problem, [outcome])
     # A solver that keeps no history has its end.
     end = Best(outcome.evaluations.f, outcome.objective if outcome.claimed else None, outcome.time_s)
-    course = outcome.history or (end,)
-    history = [course[k] for k in find_changes([best.objective for best in course])]
-    judged = describe_evaluation(evaluate(problem, outcome.x, prove=False))
-    return make_record(
+    return judge_run(
         run,
         inputs,
-        Times(
-            build=prepared_s - compile_s,
-            compile=compile_s,
-            solve=outcome.time_s,
-            objective=outcome.objective_s,
-            history=tuple(best.time_s for best in history),
-        ),
+        outcome.history or (end,),
+        outcome.x,
+        Times(build=prepared_s - compile_s, compile=compile_s, solve=outcome.time_s, objective=outcome.objective_s),
         settings=settings,
         status=solution.status if solver.name == IPOPT else outcome.status,  # other solvers are quoted
         reported_feasible=outcome.claimed,
-        x=problem.by_name(outcome.x),
-        reported_objective=judged["objective"] if math.isfinite(judged["objective"]) else None,
-        **judged,
+        reported_objective=outcome.objective if math.isfinite(outcome.objective) else None,
         counts=outcome.evaluations.by_kind(),
         iterations=outcome.iterations,
         active_constraints=solution.active_constraints,
-        history=History(
-            evaluations=tuple(best.calls for best in history), objective=tuple(best.objective for best in history)
-        ),
     )

@@ -15,11 +15,11 @@ from compare.analysis.units import with_unit
 from docs.difficulty import Best, Difficulty, Reached, difficulties
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.decoding import find_groups
 from nlp_gait.formulation import GaitProblem, list_problems, load
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaitbench.facts import DEFINITIONS, load_facts
-from nlp_gait.option_groups import find_groups
 from nlp_gait.proofs.certificate import load_certificates
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.symbolic.nonsmooth import Exact

@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 from casadi import MX, Function, vertcat
 
+from nlp_gait.decoding import find_groups, list_options, pack_options, replace_signature
 from nlp_gait.errors import InputError, check_name, describe_type, format_value, unknown
 from nlp_gait.files import check_path
 from nlp_gait.formulation.added_limits import AddedLimits, hash_limits, resolve_limits
@@ -19,7 +20,6 @@ from nlp_gait.formulation.assembly import Assembly, Parameter, Variable, is_numb
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.plain_problem import name_problem
-from nlp_gait.option_groups import find_groups, list_options, pack_options, replace_signature
 from nlp_gait.providers import PROBLEMS, import_object
 from nlp_gait.symbolic.nonsmooth import Exact
 
