@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from typer import Option
+from typer import Argument, Option
 
 from compare.analysis.units import make_heading, with_unit
 from compare.cli.command import OUTPUT_FILE, command
-from compare.cli.options import AnyProblem, parse_number, parse_numbers, parse_options, parse_pairs
+from compare.cli.options import ProblemOptions, parse_number, parse_numbers, parse_options, parse_pairs
 from compare.cli.printing import Output, Rows, fail
 from compare.judge import Evaluation
 from compare.judge import evaluate as judge
@@ -36,7 +36,8 @@ def evaluate(
     touch_down: Annotated[float | None, Option(min=0.0, max=300.0)] = None,
     engine: bool = True,
     *,
-    problem: AnyProblem,
+    name: Annotated[str | None, Argument(metavar="[PROBLEM]")] = None,
+    changes: ProblemOptions,
     table: Annotated[Path | None, Option("--csv"), OUTPUT_FILE] = None,
 ) -> Output:
     """Evaluate candidates with the exact functions, at the problem's samples and on a dense grid.
@@ -45,10 +46,12 @@ def evaluate(
     `nlp-gait evaluate nao-ssp --x points.csv --csv judged.csv`, `nlp-gait evaluate --motion gait.csv --robot nao-v5`
     """
     if motion is not None and x is None:
-        return _evaluate_motion(problem, motion, touch_down, engine)
+        return _evaluate_motion(name, changes, motion, touch_down, engine)
     if x is None or motion is not None:
         fail("give a point with --x, or a motion with --motion")
-    loaded = problem.spec().load()
+    if name is None:
+        fail("name the problem, for example nao-ssp; it may be left out only where a file names it")
+    loaded = changes.make_spec(name).load()
     many = x.endswith(".csv")
     points = read_points(Path(x), loaded, FINALS)[1] if many else [loaded.check_x(parse_numbers("x", x, "--x"))]
     judged = [judge(loaded, point) for point in points]
@@ -59,19 +62,21 @@ def evaluate(
     return Output(data=data, parts=[_tabulate(judged)], written=written)
 
 
-def _evaluate_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None, engine: bool) -> Output:
+def _evaluate_motion(
+    name: str | None, changes: ProblemOptions, motion: Path, touch_down_s: float | None, engine: bool
+) -> Output:
     """Judge a gait from joint angles, with changed limits; InputError for a file without a gait, or an option without effect."""
     from compare.questions.recorded import judge_gait
     from nlp_gait.gaits.nao.recorded import GAITS, make_recorded_gait
 
-    robot, values = problem.robot or "nao-v5", dict(parse_pairs(problem.values, "--set"))
-    intervals, name = values.pop("intervals", None), problem.name or GAITS[0]
+    robot, values = changes.robot or "nao-v5", dict(parse_pairs(changes.values, "--set"))
+    intervals = values.pop("intervals", None)
     gait = make_recorded_gait(
         read_joint_angles(motion, load_robot(robot)),
         robot=robot,
-        gait=problem.name,
+        gait=name,
         touch_down_s=touch_down_s,
-        **({} if intervals is None else parse_options(name, [("intervals", intervals)])),
+        **({} if intervals is None else parse_options(name or GAITS[0], [("intervals", intervals)])),
     )
     numbers = {key: parse_number(key, text, "--set") for key, text in values.items()}
     gait = replace(gait, problem=gait.problem.with_values(**numbers))

@@ -11,10 +11,9 @@ from typing import Annotated, Any
 from typer import Argument, Option
 
 from compare.cli.command import OUTPUT
-from compare.study.record import load_result_or_record
 from compare.study.run import ProblemSpec
 from nlp_gait.errors import InputError, describe_type, unknown
-from nlp_gait.formulation import GaitProblem, Result
+from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.user_code import allow_code, is_reference
 
@@ -32,19 +31,6 @@ ProblemName = Annotated[str, Argument(metavar="PROBLEM")]
 Robot = str | None
 Values = Annotated[list[str] | None, Option("--set", metavar="NAME=VALUE")]
 Limits = Annotated[list[str] | None, Option("--limit", metavar="NAME")]
-
-
-@dataclass(frozen=True, kw_only=True)
-class StoredGait:
-    """A gait in a file, and the user code that it needs."""
-
-    result: Annotated[Path, Argument(metavar="RESULT.json")]
-    code: Code = None
-
-    def load(self) -> Result:
-        """Return the gait; raises as ``load_result_or_record``, and InputError for code that is not a reference."""
-        name_all(self.code)
-        return load_result_or_record(self.result)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,19 +72,6 @@ class NamedProblem(ProblemOptions):
     def load(self) -> GaitProblem:
         """Return the problem; raises as ``make_spec``."""
         return self.spec().load()
-
-
-@dataclass(frozen=True, kw_only=True)
-class AnyProblem(ProblemOptions):
-    """A problem whose name may be left out where a file determines it."""
-
-    name: Annotated[str | None, Argument(metavar="[PROBLEM]")] = None
-
-    def spec(self) -> ProblemSpec:
-        """Return the problem; raises as ``make_spec``."""
-        if self.name is None:
-            raise InputError("name the problem, for example nao-ssp; it may be left out only where a file names it")
-        return self.make_spec(self.name)
 
 
 def name_all(code: Sequence[str] | None) -> None:

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from typer import Option
+from typer import Argument, Option
 
 from compare.analysis.units import format_millimetres, with_unit
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
-from compare.cli.options import StoredGait, parse_numbers
+from compare.cli.options import Code, name_all, parse_numbers
 from compare.cli.printing import Output, Rows, show_progress
 from compare.judge import find_faults
+from compare.study.record import load_result_or_record
 from nlp_gait.errors import InputError, MissingExtraError, OutputError
 from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
 from nlp_gait.simulation.video import Frame, check_frames, check_video_path, write_video
@@ -86,8 +87,9 @@ class ConditionOptions:
 
 @command
 def simulate(
-    stored: StoredGait,
+    result: Annotated[Path, Argument(metavar="RESULT.json")],
     *,
+    code: Code = None,
     steps: Annotated[int | None, Option(min=1, max=1000)] = None,
     out: Annotated[Path | None, OUTPUT] = None,
     page: Annotated[Path | None, Option(metavar="FILE.html"), OUTPUT_FILE] = None,
@@ -120,12 +122,13 @@ def simulate(
     if video is not None:
         check_video_path(video)
     folder = None if out is None else make_writable_folder(out)
+    name_all(code)
     conditions = world.make()
     with hold_robots():
-        result = stored.load()
-        plan = make_plan(result, steps)
+        gait = load_result_or_record(result)
+        plan = make_plan(gait, steps)
         drive = drive_options.make(plan)
-        faults = find_faults(result, stored.result)
+        faults = find_faults(gait, result)
     if video is not None:
         check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
     simulation = SimulationRun(plan, conditions, drive)
@@ -135,7 +138,7 @@ def simulate(
     data["faults"], parts = faults, [*faults, *parts]
     model, _ = prepare(plan, conditions, drive)
     if page is not None:
-        _write_page(page, make_skeleton(plan, trace, model, result.problem.title), trace)
+        _write_page(page, make_skeleton(plan, trace, model, gait.problem.title), trace)
     if video is not None:
         write_video(video, _show_pictures(draw_pictures(plan, trace, model), len(list_frames(trace))), FRAMES_PER_S)
     if folder is not None:
