@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 
@@ -17,11 +17,18 @@ from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import StepMotion, make_standing_step
 from nlp_gait.gaits.stairs.planar_biped import MOVING, StanceLoads
+from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, compute_heights, compute_shank_gaps
 
-AXES = ("x", "z")
+AXES, FOOT_POINTS = ("x", "z"), ("toe", "sole", "ankle")
 RATE_LIMIT, ACCELERATION_LIMIT = 12.0, 80.0  # [rad/s], [rad/s^2]
 FORCE_LIMITS = ((-600.0, 600.0), (0.0, 900.0))  # of the ground on a point of the rear foot, along x and z [N]
-# A start point: noise on the link angles [rad], and the rear foot's share of the load [N].
+EDGE_RESERVE = 0.01  # by which edges are nearer than the steps' [m]; they are rounded over ``stair.EDGE_WIDTH``
+RAMP = 0.1  # share of the swing over which the clearance grows, and falls again
+ROUNDING = 2e-3  # height of a rounded edge below a foot that stands before it [m]
+# A start point: hip ahead of the rear ankle and above it where two steps meet, and above the ankles of the standing robot [m];
+# the torso's pitch [rad]; height of the swing above the higher step [m].
+HIP_BETWEEN, HIP_STANDING, TORSO, LIFT = (0.10, 0.68), (0.06, 0.70), 1.35, 0.06
+# Noise on its link angles [rad], and the rear foot's share of the load [N].
 NOISE, TOE_LOAD, SOLE_LOAD = 0.02, 250.0, 100.0
 FINE_INTERVALS = 1000  # of a simulated gait
 
@@ -40,13 +47,6 @@ PARAMETERS = (
 )
 
 
-def make_climb_step(intervals: int, behind: int = 1, ahead: int = 1) -> "ClimbStep":
-    """Return a step whose rear sole and toe lift when the paper's do, in proportion to its time; see ``ClimbStep``."""
-    sole_off, toe_off, _, end = stair.PAPER_TIMES
-    lifts = [max(1, round(time / end * intervals)) for time in (sole_off, toe_off)]
-    return ClimbStep(intervals=intervals, sole_off=lifts[0], toe_off=lifts[1], behind=behind, ahead=ahead)
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ClimbStep:
     """One step as a trajectory optimisation.
@@ -56,10 +56,26 @@ class ClimbStep:
     """
 
     intervals: int  # N, equal parts of the step
-    sole_off: int  # number of intervals with load on the rear sole
-    toe_off: int  # number of intervals with load on the rear toe: the double support
-    behind: int = 1  # steps by which the rear ankle is behind and below the stance ankle at the start
-    ahead: int = 1  # steps by which it is ahead and above at the end
+    behind: int  # steps by which the rear ankle is behind and below the stance ankle at the start
+    ahead: int  # steps by which it is ahead and above at the end
+
+    @property
+    def sole_off(self) -> int:
+        """Number of intervals with load on the rear sole, which lifts when the paper's does, in proportion to the time."""
+        return self._find_lift(0)
+
+    @property
+    def toe_off(self) -> int:
+        """Number of intervals with load on the rear toe: the double support."""
+        return self._find_lift(1)
+
+    def _find_lift(self, phase: int) -> int:
+        return max(1, round(stair.PAPER_TIMES[phase] / stair.PAPER_TIMES[-1] * self.intervals))
+
+    @property
+    def kind(self) -> StepKind:
+        """Which ground it passes."""
+        return "next" if self.behind else "first"
 
     @cached_property
     def layout(self) -> Layout:
@@ -81,14 +97,15 @@ class ClimbStep:
             )
         )
 
-    def load(self, x: Mapping[str, MX], point: Point) -> tuple[MX, tuple[Constraint, ...], dict[str, MX]]:
-        """Return the effort, rows of forces, pressure and knees, and indexes."""
+    def assemble(self, x: Mapping[str, MX], point: Point) -> tuple[MX, tuple[Constraint, ...], dict[str, MX]]:
+        """Return the effort, all rows, and indexes."""
         step = point["step_time_s"] / self.intervals
         torque, stance, pressure = self.compute_loads(x)
         effort = point["torque_weight"] * ca.sumsqr(torque)
         effort += point["acceleration_weight"] * ca.sumsqr(x["acceleration"])
         rate = DM(biped.JOINT_RATES) @ (x["rate"][:, 1:] + x["rate"][:, :-1]) / 2
         rows = (
+            *self._limit_motion(x, point),
             stair.limit_grip("friction_toe", x["toe_force"], point["friction"]),
             stair.limit_grip("friction_sole", x["sole_force"], point["friction"]),
             stair.limit_grip("friction_stance", stance, point["stance_friction"]),
@@ -127,9 +144,24 @@ class ClimbStep:
             self.toe_off * step,
         )
 
-    def join_start(self, angle: Array, duration_s: float) -> Array:
-        """Return the start point of link angles (7, n + 1) over equal times, with a part of the load on the rear foot."""
-        step = duration_s / self.intervals
+    def start(self, size: Array, duration_s: float, rng: np.random.Generator) -> Array:
+        """Return a start point on steps of tread and rise (2,) [m]."""
+        n = self.intervals
+        s = np.linspace(0.0, 1.0, n + 1)[:, None]
+        smooth = s**2 * (3 - 2 * s)
+        between = np.array(HIP_BETWEEN)
+        first, last = (between - size if self.behind else HIP_STANDING), (between if self.ahead else HIP_STANDING)
+        hip = first + smooth * (np.array(last) - first)
+        swing = np.clip((s[:, 0] - self.toe_off / n) / (1 - self.toe_off / n), 0.0, 1.0)
+        way = (self.behind + self.ahead) * size
+        late, early = (np.interp(swing, ends, (0.0, 1.0)) for ends in ((0.25, 1.0), (0.0, 0.6)))
+        late, early = (share**2 * (3 - 2 * share) for share in (late, early))
+        ankle = np.column_stack([late * way[0], early * way[1] + LIFT * np.sin(np.pi * swing)]) - self.behind * size
+        still = np.zeros(n + 1)
+        legs = [*_reach(ankle - hip), *_reach(-hip)]
+        angle = np.stack([*legs, still + TORSO, still, still])
+        angle += NOISE * rng.standard_normal(angle.shape)
+        step = duration_s / n
         rate = np.gradient(angle, step, axis=1)
         return self.layout.join(
             {
@@ -148,43 +180,46 @@ class ClimbStep:
         at_intervals = biped.make_loads("T", "S").map(n)
         return StanceLoads(*at_intervals(x["angle"][:, :n], x["rate"][:, :n], x["acceleration"], toe, sole))
 
-    @cached_property
-    def _instant(self) -> ca.Function:
-        """Swing toe and ankle (2,) from the stance ankle [m]."""
-        q = SX.sym("q", len(MOVING))
-        places = biped.locate_points(biped.link_angles(q), SX(2, 1))
-        return ca.Function("places", [q], ca.cse([places["T"], places["A"]]))
-
-    def limit_motion(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
-        """Return rows of the quantised dynamics (eqs. 44, 45)."""
-        n, step = self.intervals, point["step_time_s"] / self.intervals
+    def _limit_motion(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
+        """Return rows of the quantised dynamics (eqs. 44, 45), feet, shanks and standing ends."""
+        n, step, lift = self.intervals, point["step_time_s"] / self.intervals, self.toe_off
         q, v, a = x["angle"], x["rate"], x["acceleration"]
         rates = v[:, 1:] - v[:, :n] - a * step  # (eq. 44)
         angles = q[:, 1:] - q[:, :n] - v[:, :n] * step - 0.5 * a * step**2  # (eq. 45)
-        steps = range(1, n + 1)
-        return (
-            make_equal_rows("rate_continuity", rates, MOVING, steps, "rad/s", 1.0),
-            make_equal_rows("angle_continuity", angles, MOVING, steps, "rad", 0.1),
-        )
-
-    def place_feet(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
-        """Return rows of the swing foot's positions."""
-        n, lift = self.intervals, self.toe_off
         size = ca.vertcat(*stair.read_stair(point))
-        q = x["angle"]
-        swing_toe, ankle = self._instant.map(n + 1)(q)
+        heights, gaps, centre, ends, feet = make_instant(self.kind).map(n + 1)(q, v, ca.repmat(size, 1, n + 1))
+        swing_toe, ankle = ca.vertsplit(feet, [0, 2, 4])
         flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
         rear = self.behind * size
         toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(biped.load_toe_foot_biped().foot_m, 0) - rear, 1, lift)
-        ends = ca.horzcat(ankle[:, 0] + rear, ankle[:, n] - self.ahead * size)
-        return (
+        placed = ca.horzcat(ankle[:, 0] + rear, ankle[:, n] - self.ahead * size)
+        # The clearance grows and falls with the swing.
+        swing = range(lift + 1, n + 1)
+        share = np.array([min(k - lift, n - k) / (n - lift) / RAMP for k in swing]).clip(0.0, 1.0)
+        least = ca.vec(ca.repmat(point["clearance_m"] * DM(share[None, :]), 3, 1)) - ROUNDING
+        feet_still = v[[MOVING.index(link) for link in ("UH", "AS", "ST")], :][:, [0, n]]
+        steps, soles = range(1, n + 1), range(1, self.sole_off + 1)
+        rows = [
+            make_equal_rows("rate_continuity", rates, MOVING, steps, "rad/s", 1.0),
+            make_equal_rows("angle_continuity", angles, MOVING, steps, "rad", 0.1),
             make_equal_rows("toe_stands", toe, AXES, range(1, lift + 1), "m", 0.01),
-            make_equal_rows(
-                "toe_flat", flat[1, 1 : self.sole_off + 1], ("ST",), range(1, self.sole_off + 1), "rad", 0.1
-            ),
+            make_equal_rows("toe_flat", flat[1, 1 : self.sole_off + 1], ("ST",), soles, "rad", 0.1),
             make_equal_rows("foot_flat", flat[:, [0, n]], ("AS", "ST"), (0, n), "rad", 0.1),
-            make_equal_rows("ankle_on_step", ends, AXES, (0, n), "m", 0.01),
-        )
+            make_equal_rows("ankle_on_step", placed, AXES, (0, n), "m", 0.01),
+            make_equal_rows("torso_still", v[MOVING.index("UH"), 1:n], ("UH",), range(1, n), "rad/s", 1.0),
+            make_equal_rows("foot_still", feet_still, ("UH", "AS", "ST"), (0, n), "rad/s", 1.0),
+            make_equal_rows("ankle_still", ends[4:6, [0, n]], AXES, (0, n), "m/s", 0.1),
+            stair.make_rows("clearance_in_support", heights[1:, :lift], ("sole", "ankle"), "m", 0.01, lower=-ROUNDING),
+            stair.make_rows(
+                "clearance_in_swing", heights[:, lift + 1 :], FOOT_POINTS, "m", 0.01, lower=least, columns=swing
+            ),
+            stair.limit_shanks(gaps, self.kind),
+        ]
+        for instant, stands in ((0, not self.behind), (n, not self.ahead)):
+            if stands:
+                at_rest = make_equal_rows("rest", ends[2:4, instant], AXES, (instant,), "m/s", 0.1)
+                rows += [at_rest, replace(stair.limit_stance_zmp(point, centre[:, instant]), name="standing")]
+        return tuple(rows)
 
 
 def make_equal_rows(
@@ -192,3 +227,30 @@ def make_equal_rows(
 ) -> Constraint:
     """Return rows value == 0."""
     return stair.make_rows(name, value, of, unit, scale, lower=0.0, upper=0.0, columns=columns)
+
+
+def make_instant(kind: StepKind) -> ca.Function:
+    """Return the function (angles, rates (7,), tread and rise (2,)) of an instant.
+
+    Its outputs are heights (3,) of swing toe, sole and ankle above the stair, the shanks' gaps, the centre of mass ahead of the
+    stance ankle, place and velocity of the hip and velocity of the swing ankle (6,), and places of swing toe and ankle (4,) [m].
+    """
+    q, v, size = SX.sym("q", len(MOVING)), SX.sym("v", len(MOVING)), SX.sym("size", 2)
+    points = biped.locate_points(biped.link_angles(q), SX(2, 1))
+    steps, setback = Stair(size[0], size[1]), stair.SETBACK + EDGE_RESERVE
+    heights = compute_heights(points, steps, setback, stair.EDGE_WIDTH, kind)
+    robot = biped.load_toe_foot_biped()
+    centres = biped.locate_centres(points)
+    centre = sum((biped.get_rod(link).mass_kg * place[0] for link, place in centres.items()), SX(0)) / robot.mass_kg
+    ends = ca.vertcat(points["H"], *(ca.jtimes(points[name], q, v) for name in "HA"))
+    gaps = compute_shank_gaps(points, steps, stair.SETBACK, kind)
+    outputs = [heights, gaps, centre, ends, ca.vertcat(points["T"], points["A"])]
+    return ca.Function("instant", [q, v, size], ca.cse(outputs))
+
+
+def _reach(ankle: Array) -> tuple[Array, Array]:
+    """Return the angles (T,) of thigh and shank that bring the ankle to a place (T, 2) from the hip, the knee bent forward."""
+    length = biped.get_rod("HK").length_m
+    half = np.arccos(np.clip(np.hypot(*ankle.T) / (2 * length), 0.0, 0.99))
+    direction = np.arctan2(-ankle[:, 1], ankle[:, 0])
+    return direction - half, direction + half

@@ -41,26 +41,19 @@ GIVEN = {
     "hip": 6,
 }
 TORSO = biped.LINKS.index("UH")
-# Controlled angles as sums of link angles, in the order of LINKS. Joint angles are between links; the ninth is that of the stance
-# sole, whose torque the ground gives. As printed, knees are relative to thighs (27), (28), other angles from the forward axis.
-_KNEES = {"knee": {"KA": 1, "HK": -1}, "knee'": {"K'A'": 1, "HK'": -1}}
+# Controlled angles as sums of link angles, in the order of LINKS: joint angles, and that of the stance sole, whose torque the
+# ground gives; as printed, knees are relative to thighs (27), (28), other angles from the forward axis.
 ANGLES: Mapping[Coordinates, Mapping[str, Mapping[str, int]]] = {
     "joint": {
-        "hip": {"HK": 1, "UH": 1},
-        "knee": _KNEES["knee"],
-        "hip'": {"HK'": 1, "UH": 1},
-        "knee'": _KNEES["knee'"],
-        "ankle'": {"K'A'": 1, "A'S'": -1},
-        "ankle": {"AS": 1, "KA": -1},
-        "toe": {"ST": 1, "AS": -1},
+        **{name: terms for name, terms in biped.JOINT_ANGLES.items() if name != "toe'"},
         "sole'": {"A'S'": 1},
-        "toe'": {"S'T'": 1, "A'S'": -1},
+        "toe'": biped.JOINT_ANGLES["toe'"],
     },
     "printed": {
         "HK": {"HK": 1},
-        "knee": _KNEES["knee"],
+        "knee": biped.JOINT_ANGLES["knee"],
         "HK'": {"HK'": 1},
-        "knee'": _KNEES["knee'"],
+        "knee'": biped.JOINT_ANGLES["knee'"],
         **{link: {link: 1} for link in biped.LINKS[4:]},
     },
 }
@@ -190,11 +183,13 @@ class ClosedLoop:
         place, _, push = self.locate_base(named["hip"])
         places = biped.locate_points(state.q, place, self.base_point)
         centres = biped.locate_centres(places)
-        accelerations = {link: self._accelerate(centre, state, acceleration) + push for link, centre in centres.items()}
-        forces, spins = biped.compute_pushes(accelerations, acceleration)
-        pull, weight = ca.vertsplit(sum(forces.values(), SX(2, 1)))
-        moment = sum((biped.compute_moment(centres[link], forces[link]) for link in biped.LINKS), SX(0))
-        moment += named["spin"] * sum(spins.values(), SX(0))
+        whole, moment = SX(2, 1), named["spin"] * biped.compute_spin_moment(acceleration)
+        for link, centre in centres.items():
+            velocity = ca.jtimes(centre, *state)
+            total = ca.jtimes(velocity, *state) + ca.jtimes(centre, state.q, acceleration) + push
+            force = biped.get_rod(link).mass_kg * (total + ca.vertcat(0, biped.GRAVITY))
+            whole, moment = whole + force, moment + biped.compute_moment(centre, force)
+        pull, weight = ca.vertsplit(whole)
         least = biped.LEAST_LOAD * biped.load_toe_foot_biped().mass_kg * biped.GRAVITY
         zmp = moment / ca.fmax(weight - named["slope"] * pull, least)  # (eq. 49)
         return ca.Function(
@@ -203,11 +198,6 @@ class ClosedLoop:
             ca.cse([torque, zmp]),
             {"is_diff_in": [True, True, False, True]},
         )
-
-    @staticmethod
-    def _accelerate(place: SX, state: QuantisedState, acceleration: SX) -> SX:
-        velocity = ca.jtimes(place, state.q, state.v)
-        return ca.jtimes(velocity, state.q, state.v) + ca.jtimes(place, state.q, acceleration)
 
     def _symbols(self) -> tuple[QuantisedState, list[SX], dict[str, Any]]:
         """Return the state, the inputs given and tuned, and their parts by name, with controller and desired state."""

@@ -29,16 +29,11 @@ TORSO = "torso"
 LEG = {"Hip": ("thigh", "HK"), "Knee": ("shank", "KA"), "Ankle": ("sole", "AS"), "Toe": ("toe", "ST")}
 SIDES = {"L": ("left", "'"), "R": ("right", "")}
 JOINTS = tuple(f"{letter}{joint}" for letter in SIDES for joint in LEG)
-# The model's joint for each of these, and whether it turns the same way; it has none for the toe that stands.
-MODEL_JOINT = {
-    "LHip": ("hip'", 1.0),
-    "LKnee": ("knee'", -1.0),
-    "LAnkle": ("ankle'", -1.0),
-    "RHip": ("hip", 1.0),
-    "RKnee": ("knee", 1.0),
-    "RAnkle": ("ankle", 1.0),
-    "RToe": ("toe", 1.0),
-}
+# The same joints of the planar model, whether they turn the same way, their angles in the zero pose, and by those of the links.
+MODEL_JOINTS = tuple(f"{joint.lower()}{mark}" for _, mark in SIDES.values() for joint in LEG)
+SENSES = np.array([-1.0 if joint == "ankle'" else 1.0 for joint in MODEL_JOINTS])
+ZERO_POSE = np.array([np.pi, 0.0, -np.pi / 2, 0.0] * len(SIDES))
+FROM_LINKS = SENSES * np.array([[biped.JOINT_ANGLES[j].get(link, 0) for j in MODEL_JOINTS] for link in biped.LINKS])
 
 
 @cache
@@ -81,34 +76,10 @@ def make_rigid_bodies() -> Robot:
     )
 
 
-def compute_joint_angles(q: Array, *, rates: bool = False) -> Array:
-    """Return joint angles (T, 8) from absolute link angles (T, 9) in the order of ``LINKS``; with ``rates``, rates."""
-    turned = _compute_turns(q, 0.0 if rates else 1.0)
-    columns = []
-    for _, mark in SIDES.values():
-        before = "UH"
-        for _part, paper_name in LEG.values():
-            link = "".join(f"{end}{mark}" for end in paper_name).replace("H'", "H")
-            columns.append(turned[link] - turned[before])
-            before = link
-    return np.stack(columns, axis=1)
-
-
 def compute_joint_torques(model: Array, stance_toe: Array) -> Array:
     """Return joint torques (T, 8) from ``compute_loads``' (T, 7) and the standing toe's (T,), which these lack [Nm]."""
-    angles = {name: sense * model[:, biped.JOINTS.index(joint)] for name, (joint, sense) in MODEL_JOINT.items()}
-    return np.stack([angles.get(name, stance_toe) for name in JOINTS], axis=1)
-
-
-def _compute_turns(q: Array, share: float) -> dict[str, Array]:
-    """Return the rotation of every link about the axis to the left from the zero pose; ``share`` 0 for rates."""
-    upright = share * np.pi / 2
-    zero = {"UH": -upright, "AS": 0.0, "ST": 0.0}
-    turns = {}
-    for i, link in enumerate(biped.LINKS):
-        sense = -1.0 if link == "UH" else 1.0
-        turns[link] = sense * q[:, i] - zero.get(link.replace("'", ""), upright)
-    return turns
+    names = (*biped.JOINTS, "toe'")
+    return SENSES * np.column_stack([model, stance_toe])[:, [names.index(joint) for joint in MODEL_JOINTS]]
 
 
 def _link(name: str, rod: biped.PlanarLink, along: Vector) -> Link:
@@ -210,7 +181,7 @@ def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, dou
 def make_signals(step: StepMotion, rise: float) -> Signals:
     """Return time histories of the robot's joints; the stance foot stands ``rise`` above the floor [m]."""
     places = _locate_points(step.q)
-    lean = _compute_turns(step.q, 1.0)["UH"]  # from upright, forward
+    lean = np.pi / 2 - step.q[:, biped.LINKS.index("UH")]  # from upright, forward
     still = np.zeros_like(lean)
     rear = (step.t <= step.double_support_s) | (step.t == step.t[-1])  # it lands at the end
 
@@ -220,9 +191,9 @@ def make_signals(step: StepMotion, rise: float) -> Signals:
 
     arrays = {
         "t": step.t,
-        "q": compute_joint_angles(step.q),
-        "qd": compute_joint_angles(step.qd, rates=True),
-        "qdd": compute_joint_angles(step.qdd, rates=True),
+        "q": step.q @ FROM_LINKS - ZERO_POSE,
+        "qd": step.qd @ FROM_LINKS,
+        "qdd": step.qdd @ FROM_LINKS,
         "tau": step.tau,
         "zmp": np.column_stack([step.pressure, still]),
         "hip": lift(places["H"]),
@@ -234,7 +205,7 @@ def make_signals(step: StepMotion, rise: float) -> Signals:
     }
     if step.desired is not None:
         q, qd = np.split(step.desired, 2, axis=1)
-        arrays |= {"q_desired": compute_joint_angles(q), "qd_desired": compute_joint_angles(qd, rates=True)}
+        arrays |= {"q_desired": q @ FROM_LINKS - ZERO_POSE, "qd_desired": qd @ FROM_LINKS}
     followed = {"q_desired": Columns(unit="rad", labels=JOINTS), "qd_desired": Columns(unit="rad/s", labels=JOINTS)}
     return Signals(joints=JOINTS, arrays=arrays, columns=SIMULATED | followed)
 

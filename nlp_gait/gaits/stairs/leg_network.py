@@ -10,7 +10,6 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.planar_biped import LINKS, get_rod
 
@@ -54,12 +53,6 @@ class NetworkSettings:
     iterations: int = 5000  # most steps for one pose
     tolerance_m2: float = 1e-6  # squared distance of the ankle at which the training of a pose ends [m^2]
     seed: int = 0  # of the first weights
-
-    def __post_init__(self) -> None:
-        if self.hidden < 1 or self.iterations < 1:
-            raise InputError(f"hidden and iterations must be at least 1, got {self.hidden}, {self.iterations}")
-        if not (self.rate > 0.0 and self.tolerance_m2 > 0.0):
-            raise InputError(f"rate and tolerance_m2 must be > 0, got {self.rate}, {self.tolerance_m2}")
 
     @property
     def first_weights(self) -> Array:

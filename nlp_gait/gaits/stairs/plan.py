@@ -144,10 +144,11 @@ def stairs_plan(
 def _compute_signals(planned: PlannedStep, point: NumericPoint) -> Signals:
     samples = planned.samples(point, Exact())
     arrays = {name: np.array(ca.evalf(value)).T for name, value in samples._asdict().items()}
-    moving = stair.make_joint_signals(*(arrays.pop(name) for name in ("q", "qd", "qdd")))
-    renamed = {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
-    renamed["power"] = arrays.pop("power")[:, : len(JOINTS)]
-    return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays}, columns=stair.COLUMNS)
+    for name in ("q", "qd", "qdd"):
+        arrays[f"link_{name}"] = arrays[name]
+        arrays[name] = arrays[name] @ JOINT_RATES.T
+    arrays |= {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
+    return Signals(joints=JOINTS, arrays=arrays, columns=stair.COLUMNS)
 
 
 def _simulate(point: NumericPoint) -> StepMotion:
@@ -163,8 +164,8 @@ def _simulate(point: NumericPoint) -> StepMotion:
 
 def _find_phase_times(phase: int, values: Mapping[str, float]) -> tuple[float, float]:
     """Return the start and end of a phase [s]; the step begins at zero."""
-    times = [0.0, *(values[name] for name in PHASE_ENDS)]
-    return times[phase], times[phase + 1]
+    start, end = [0.0, *(values[name] for name in PHASE_ENDS)][phase : phase + 2]
+    return start, end
 
 
 def _assemble_phase(step: PlannedStep, phase: int, point: Point, fractions: MX, ops: Nonsmooth) -> Assembly:

@@ -12,27 +12,14 @@ from casadi import DM, MX, SX
 from nlp_gait.formulation import Array, Grid, Point
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import planned_motion as planned
+from nlp_gait.gaits.stairs.planar_biped import StanceLoads
 from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan
-from nlp_gait.gaits.stairs.stair import EDGE_WIDTH, GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
+from nlp_gait.gaits.stairs.stair import EDGE_WIDTH, GOVERNING, SETBACK, collect_governing, read_stair
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
-from nlp_gait.symbolic.trajectories import Motion
 
 # Checks of the swing foot against the stair per interval; none while the toe leaves or meets the ground.
 CLEARANCE_DENSITY = 4
 GROUND_SHARE = 0.1
-_SWING = ("HK", "KA", "AS", "ST")
-# Of each joint: its point, the links on the side away from the stance toe, whether its torque turns these clockwise, and the two
-# links between which it is: its rate is the difference of theirs, or their sum for the torso, which turns counter-clockwise.
-JOINT_SIDES = {
-    "ankle'": ("A'", ("K'A'", "HK'", "UH", *_SWING), 1, ("K'A'", "A'S'")),
-    "knee'": ("K'", ("HK'", "UH", *_SWING), 1, ("HK'", "K'A'")),
-    "hip'": ("H", ("UH", *_SWING), -1, ("HK'", "UH")),
-    "hip": ("H", _SWING, 1, ("HK", "UH")),
-    "knee": ("K", ("KA", "AS", "ST"), 1, ("KA", "HK")),
-    "ankle": ("A", ("AS", "ST"), 1, ("AS", "KA")),
-    "toe": ("S", ("ST",), 1, ("ST", "AS")),
-    "toe'": ("S'", ("A'S'", "K'A'", "HK'", "UH", *_SWING), 1, ("A'S'", "S'T'")),
-}
 LEAST_ARM = 1.0  # of the force on the rear foot about the centre of pressure of the other one [N m]
 BalanceRule = Literal["feet", "polygon"]
 """What keeps a planned step upright: ``feet``, the centre of pressure below the stance foot, with a variable share of the load
@@ -48,7 +35,7 @@ class PlanSamples(NamedTuple):
     qdd: MX  # (7, m) [rad/s^2]
     reach: MX  # (2, m) cosines of swing and stance knee
     torque: MX  # (7, m) of the joints [Nm], in the order of JOINTS
-    power: MX  # (7, m) of the joints [W], signed; with ``polygon`` an eighth row for the standing toe
+    power: MX  # (7, m) of the joints [W], signed
     stance_force: MX  # (2, m) of the ground on the stance foot [N]
     stance_pressure: MX  # (1, m) its centre ahead of the stance ankle [m]
     zmp: MX  # (1, m) of the whole robot on the virtual slope, ahead of the stance ankle [m]
@@ -84,11 +71,9 @@ class PlannedStep:
 
     def samples(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> PlanSamples:
         """Return the step at all samples, or at those of another grid."""
-        s, passing = grid or self.grid
-        if self.balance == "polygon":
-            return PlanSamples(*self._map_samples(make_balanced_function(ops), point, s, passing))
-        function = sample_function(ops)
-        return PlanSamples(*self._map_samples(function, point, s, passing, point["rear_share"]))
+        further = (point["rear_share"],) if self.balance == "feet" else ()
+        function = make_sample_function(ops, self.balance)
+        return PlanSamples(*self._map_samples(function, point, *(grid or self.grid), *further))
 
     def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> MX:
         """Return heights (3, m) of toe, sole and ankle of the swing foot above the stair [m]."""
@@ -144,97 +129,68 @@ def make_phase_grid(fractions: list[Array]) -> tuple[DM, Array]:
     return ca.horzcat(*s), np.hstack(passing)
 
 
-def sample_function(ops: Nonsmooth) -> ca.Function:
+def make_sample_function(ops: Nonsmooth, balance: BalanceRule) -> ca.Function:
     """Return the function of one sample to the fields of ``PlanSamples``.
 
-    Its inputs are s, the current phase, governing parameters, size, reach margin and rear share: that of the
-    whole ground force on the rear toe at the start, which falls to zero over the double support.
+    Its inputs are those of ``make_step_symbols``, and with ``feet`` the rear share: that of the whole ground force on the rear
+    toe at the start, which falls to zero over the double support.
     """
     inputs, plan, stair, step = make_step_symbols(ops)
-    rear_share = SX.sym("rear_share")
-    s = inputs[0]
+    slope = stair.rise / stair.tread
+    if balance == "feet":
+        rear_share = SX.sym("rear_share")
+        loads, zmp = _share_load(plan, inputs[0], step, rear_share, slope)
+        inputs, support = [*inputs, rear_share], SX(2, 1)
+    else:
+        loads, zmp, support = _balance_load(inputs[1], step, slope)
+    power = loads.torque * (DM(biped.JOINT_RATES) @ step.q.velocity)
+    time = ca.dot(plan.durations, inputs[0])
+    samples = PlanSamples(
+        time, *step.q, step.reach, loads.torque, power, *loads[1:], zmp, step.hip[0], step.ankle[0], support
+    )
+    return ca.Function("sample", inputs, ca.cse([*samples]))
+
+
+def _share_load(plan: StairPlan, s: SX, step: Posture, rear_share: SX, slope: SX) -> tuple[StanceLoads[SX], SX]:
+    """Return the loads with a share of the ground force on the rear toe, and the ZMP on the virtual slope."""
     dynamics = biped.make_loads("T")
     support = ca.dot(plan.durations[:2], s[:2]) / ca.sum1(plan.durations[:2])
     share = rear_share * (1 - support**2 * (3 - 2 * support))
     _, force, whole = dynamics(*step.q, SX(2, 1))
-    torque, stance_force, pressure = dynamics(*step.q, share * force)
-    slope = stair.rise / stair.tread
     # The whole ground force acts along a line through the stance foot's level at ``whole``; where it meets the slope.
     zmp = whole * force[1] / (force[1] - slope * force[0])  # (eq. 49)
-    power = torque * (DM(biped.JOINT_RATES) @ step.q.velocity)
-    outputs = _list_outputs(inputs, plan, step, torque, power, stance_force, pressure, zmp, SX(2, 1))
-    return ca.Function("sample", [*inputs, rear_share], ca.cse(outputs))
+    return StanceLoads(*dynamics(*step.q, share * force)), zmp
 
 
-def make_balanced_function(ops: Nonsmooth) -> ca.Function:
-    """Return the function of one sample with the load on both feet by ``compute_balance``; inputs without a rear share."""
-    inputs, plan, stair, step = make_step_symbols(ops)
-    s, passing, *_ = inputs
-    torque, power, *ground = compute_balance(step, plan, s, passing, stair.rise / stair.tread)
-    outputs = _list_outputs(inputs, plan, step, torque[: len(biped.JOINTS)], power, *ground)
-    return ca.Function("sample", inputs, ca.cse(outputs))
-
-
-def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: SX) -> tuple[SX, ...]:
-    """Return torques, power, forces, ZMP and support at fractions s (4,) of the phases, of which one is ``passing`` (4,).
-
-    Outputs are those of ``PlanSamples``, with torques and power (8,) in the order of ``JOINT_SIDES``; the ZMP is (49) as printed:
-    of point masses, on the virtual slope in all phases.
+def _balance_load(passing: SX, step: Posture, slope: SX) -> tuple[StanceLoads[SX], SX, SX]:
+    """Return the loads, the ZMP of (49) as printed, of point masses on the virtual slope in all phases, and the support (2,).
 
     Both feet share the load so that the stance foot carries what it can with its centre of pressure between its contact points;
-    the forces on them are parallel.
+    the forces on them are parallel. The rear force acts between the contact points of the rear foot, whose toe is flat while its
+    sole stands.
     """
-    q, v, a = (ca.vertcat(order, SX(2, 1)) for order in step.q)  # the stance foot is flat
-    place = biped.locate_points(q, SX(2, 1))
-    middles, accelerations = biped.locate_centres(place), _accelerate_centres(Motion(q, v, a))
-    push, turn = biped.compute_pushes(accelerations, a)
-    force = sum(push.values(), SX(2, 1))
+    dynamics, nothing = biped.make_loads("T", "S"), SX(2, 1)
+    place = biped.locate_points(biped.link_angles(step.q.position), SX(2, 1))
+    _, force, whole = dynamics(*step.q, nothing, nothing)
     load = ca.fmax(force[1], biped.LEAST_LOAD * biped.GRAVITY * biped.load_toe_foot_biped().mass_kg)
-    points = sum((biped.compute_moment(middles[link], push[link]) for link in biped.LINKS), SX(0))
-    moment = points + sum(turn.values(), SX(0))
 
-    sole, toe, rear_sole, rear_toe = (place[name] for name in ("S'", "T'", "S", "T"))
-    double = passing[0] + passing[1]
-    rear = rear_toe[0] + passing[0] * (rear_sole[0] - rear_toe[0])
-    front = ca.fmin(ca.fmax(moment / load, 0), toe[0])
-    back = ca.vertcat(ca.fmin(ca.fmax(moment / load, rear), rear_toe[0]), rear_toe[1])
-    arm = ca.fmin(biped.compute_moment(back, force) - front * load, -LEAST_ARM)
-    share = double * ca.fmin(ca.fmax((moment - front * load) / arm, 0), 1)
+    toe, rear_sole, rear_toe = (place[name] for name in ("T'", "S", "T"))
+    sole_stands, double = passing[0], passing[0] + passing[1]
+    rear = rear_toe[0] + sole_stands * (rear_sole[0] - rear_toe[0])
+    front = ca.fmin(ca.fmax(whole, 0), toe[0])
+    back = ca.fmin(ca.fmax(whole, rear), rear_toe[0])
+    arm = ca.fmin(biped.compute_moment(ca.vertcat(back, rear_toe[1]), force) - front * load, -LEAST_ARM)
+    behind = double * ca.fmin(ca.fmax((whole - front) * load / arm, 0), 1) * force
+    on_sole = (rear_toe[0] - back) / biped.get_rod("ST").length_m
+    loads = StanceLoads(*dynamics(*step.q, (1 - on_sole) * behind, on_sole * behind))
 
-    torque, rate = [], []
-    for joint, links, sense, between in JOINT_SIDES.values():
-        total = sum(
-            (biped.compute_moment(middles[link] - place[joint], push[link]) + turn[link] for link in links), SX(0)
-        )
-        torque.append(-sense * (total - share * biped.compute_moment(back - place[joint], force)))
-        first, second = (v[biped.LINKS.index(link)] for link in between)
-        rate.append(first + second if "UH" in between else first - second)
-    pressure = (moment - share * biped.compute_moment(back, force)) / ca.fmax(
-        (1 - share) * load, biped.LEAST_LOAD * load
-    )
+    points = whole * load - biped.compute_spin_moment(ca.vertcat(step.q.acceleration, SX(2, 1)))
     zmp = points / ca.fmax(force[1] - slope * force[0], biped.LEAST_LOAD * load)  # (eq. 49)
-    power = ca.vertcat(*torque) * ca.vertcat(*rate)
-    return ca.vertcat(*torque), power, (1 - share) * force, pressure, zmp, ca.vertcat(double * rear, toe[0])
-
-
-def _accelerate_centres(q: Motion) -> dict[str, SX]:
-    """Return the accelerations (2,) of the links' centres [m/s^2] from angles (9,)."""
-
-    def acceleration(link: str) -> SX:
-        angle, rate, change = (order[biped.LINKS.index(link)] for order in q)
-        normal = biped.compute_direction(link, angle + ca.pi / 2)
-        return biped.get_rod(link).length_m * (change * normal - rate**2 * biped.compute_direction(link, angle))
-
-    return biped.locate_centres(biped.sum_along_links("A'", SX(2, 1), acceleration))
-
-
-def _list_outputs(inputs: list[SX], plan: StairPlan, step: Posture, *loads: SX) -> list[SX]:
-    places = [step.hip.position, step.ankle.position]
-    return [ca.dot(plan.durations, inputs[0]), *step.q, step.reach, *loads[:-1], *places, loads[-1]]
+    return loads, zmp, ca.vertcat(double * rear, toe[0])
 
 
 def make_place_function(measure: Callable[[Mapping[str, SX], Stair[SX]], SX], ops: Nonsmooth) -> ca.Function:
-    """Return the function of a measure of points by name and the stair; inputs of ``make_balanced_function``."""
+    """Return the function of a measure of points by name and the stair; inputs of ``make_step_symbols``."""
     inputs, _, stair, step = make_step_symbols(ops)
     points = biped.locate_points(biped.link_angles(step.q.position), SX(2, 1))
     return ca.Function("measure", inputs, [ca.cse(measure(points, stair))])
@@ -257,7 +213,7 @@ def make_step_symbols(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], P
     """Return symbols s, passing, governing parameters, size and reach margin; the plan, the stair and the posture of these."""
     s, passing, values = SX.sym("s", 4), SX.sym("passing", 4), SX.sym("governing", len(GOVERNING))
     size, margin = SX.sym("size", 2), SX.sym("margin")
-    plan, stair = make_stair_plan(values), Stair(size[0], size[1])
+    plan, stair = StairPlan(*ca.vertsplit(values)), Stair(size[0], size[1])
     rates = passing / plan.durations
     step = planned.compute_posture(plan, stair, s, rates, margin, ops)
     return [s, passing, values, size, margin], plan, stair, step

@@ -35,12 +35,11 @@ ENDS = {
     "A'S'": ("A'", "S'"),
     "S'T'": ("S'", "T'"),
 }
-# Links in the order in which they are reached from a base, and whether they are passed from their far end.
+# Links in the order in which they are reached from the stance ankle or the hip, and whether they are passed from their far end.
 _SWING = (("UH", 1), ("HK", 1), ("KA", 1), ("AS", 1), ("ST", 1))
 _FOOT = (("A'S'", 1), ("S'T'", 1))
 _PATHS: Mapping[str, tuple[tuple[str, int], ...]] = {
     "A'": (("K'A'", -1), ("HK'", -1), *_SWING, *_FOOT),
-    "T'": (("S'T'", -1), ("A'S'", -1), ("K'A'", -1), ("HK'", -1), *_SWING),
     "H": (*_SWING, ("HK'", 1), ("K'A'", 1), *_FOOT),
 }
 
@@ -115,7 +114,7 @@ def compute_direction(link: str, angle: SX) -> SX:
 
 
 def locate_points(q: Sequence[SX] | SX, place: SX, base: str = "A'") -> dict[str, SX]:
-    """Return joints and ends by name, (2,) each [m], from nine angles [rad] and the place (2,) of a base: A', toe T' or hip H."""
+    """Return joints and ends by name, (2,) each [m], from nine angles [rad] and the place (2,) of a base: A' or the hip H."""
     return sum_along_links(
         base, place, lambda link: get_rod(link).length_m * compute_direction(link, q[LINKS.index(link)])
     )
@@ -148,13 +147,11 @@ def compute_moment(place: SX, force: SX) -> SX:
     return place[0] * force[1] - place[1] * force[0]
 
 
-def compute_pushes(accelerations: Mapping[str, SX], spins: SX) -> tuple[dict[str, SX], dict[str, SX]]:
-    """Return the forces (2,) [N] and counter-clockwise moments [N m] that move the links, from their centres and spins (9,)."""
-    upward = ca.vertcat(0, GRAVITY)
-    forces = {link: get_rod(link).mass_kg * (accelerations[link] + upward) for link in LINKS}
-    senses = [1 if link == "UH" else -1 for link in LINKS]
-    moments = {link: get_rod(link).inertia_kgm2 * spins[i] * senses[i] for i, link in enumerate(LINKS)}
-    return forces, moments
+def compute_spin_moment(spins: SX) -> SX:
+    """Return the counter-clockwise moment that turns all links, from the second derivatives of their angles (9,) [N m]."""
+    return sum(
+        (get_rod(link).inertia_kgm2 * spins[i] * (1 if link == "UH" else -1) for i, link in enumerate(LINKS)), SX(0)
+    )
 
 
 def make_dynamics(q: SX, qd: SX, angles: SX, base: str = "A'") -> EquationsOfMotion:
@@ -175,20 +172,20 @@ def make_dynamics(q: SX, qd: SX, angles: SX, base: str = "A'") -> EquationsOfMot
 
 # Links that move while the stance foot stands flat: coordinates q of the model.
 MOVING = LINKS[:7]
-# Joints between them, from the stance foot to the swing toe.
+# Angles of joints as sums of absolute angles, between two links; the torso's angle runs the other way.
+JOINT_ANGLES: Mapping[str, Mapping[str, int]] = {
+    "hip": {"HK": 1, "UH": 1},
+    "knee": {"KA": 1, "HK": -1},
+    "hip'": {"HK'": 1, "UH": 1},
+    "knee'": {"K'A'": 1, "HK'": -1},
+    "ankle'": {"K'A'": 1, "A'S'": -1},
+    "ankle": {"AS": 1, "KA": -1},
+    "toe": {"ST": 1, "AS": -1},
+    "toe'": {"S'T'": 1, "A'S'": -1},
+}
+# Joints between them, from the stance foot to the swing toe; their rates are JOINT_RATES @ qd.
 JOINTS = ("ankle'", "knee'", "hip'", "hip", "knee", "ankle", "toe")
-# Joint rates are JOINT_RATES @ qd: differences of absolute link rates. The torso's angle runs the other way.
-JOINT_RATES = np.array(
-    [  # HK, KA, HK', K'A', UH, AS, ST
-        [0, 0, 0, 1, 0, 0, 0],
-        [0, 0, 1, -1, 0, 0, 0],
-        [0, 0, 1, 0, 1, 0, 0],
-        [1, 0, 0, 0, 1, 0, 0],
-        [-1, 1, 0, 0, 0, 0, 0],
-        [0, -1, 0, 0, 0, 1, 0],
-        [0, 0, 0, 0, 0, -1, 1],
-    ]
-)
+JOINT_RATES = np.array([[JOINT_ANGLES[joint].get(link, 0) for link in MOVING] for joint in JOINTS])
 # In free fall there is no pressure below the foot: a smaller stance force counts as this share of the weight in its centre.
 LEAST_LOAD = 1e-3
 

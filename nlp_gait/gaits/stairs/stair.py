@@ -5,19 +5,16 @@ from collections.abc import Sequence
 from math import inf
 
 import casadi as ca
-from casadi import MX, SX
+from casadi import MX
 
-from nlp_gait.formulation import Array, Columns, Constraint, Point, Variable, make_parameters, make_vector_columns
+from nlp_gait.formulation import Columns, Constraint, Point, Variable, make_parameters, make_vector_columns
 from nlp_gait.formulation.blocks import make_labels
-from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, load_toe_foot_biped
-from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, StepKind, list_shank_edges
+from nlp_gait.gaits.stairs.planar_biped import JOINTS, MOVING, load_toe_foot_biped
+from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, list_shank_edges
 
 PAPER_TIMES = (0.5, 1.4, 2.2, 3.5)  # t1, t2, t_bc, t3 [s], Table III
 EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
 SETBACK = 0.06  # distance of an edge behind the ankle that stands on the step [m]
-
-# Stairs of Table IV by case: double tread ("stair length") [m], rise over run.
-CASES = {1: (0.5588, 0.64), 2: (0.508, 0.70), 3: (0.5588, 0.72)}
 
 # Absolute link angles [rad]: leg and foot clockwise from the forward axis, torso counter-clockwise.
 ANGLE_LIMITS = {
@@ -47,8 +44,8 @@ COLUMNS = {
 
 
 STAIR_PARAMETERS = make_parameters(
-    ("stair_length_m", "m", CASES[2][0], "length of a double step: two treads (Table IV)", 0.05, 2.0),
-    ("rise_run_ratio", "1", CASES[2][1], "rise over run", 0.01, 5.0),
+    ("stair_length_m", "m", 0.508, "length of a double step: two treads (case 2 of Table IV)", 0.05, 2.0),
+    ("rise_run_ratio", "1", 0.70, "rise over run", 0.01, 5.0),
 )
 # Row of a table of parameters.
 LEAST_STANCE_FORCE = ("least_stance_force_N", "N", 20.0, "least load of the stance foot", 0.0, inf)
@@ -63,13 +60,6 @@ def read_stair(point: Point) -> Stair[MX]:
     """Tread and rise of one step from the problem's parameters."""
     tread: MX = point["stair_length_m"] / 2
     return Stair(tread, point["rise_run_ratio"] * tread)
-
-
-def make_joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
-    """Return histories of joints, differences of links' absolute angles (``JOINT_RATES``), and of links (m rows, as MOVING)."""
-    links = {"q": q, "qd": qd, "qdd": qdd}
-    joints = {name: value @ JOINT_RATES.T for name, value in links.items()}
-    return {**joints, **{f"link_{name}": value for name, value in links.items()}}
 
 
 def make_rows(
@@ -156,8 +146,3 @@ def collect_governing(point: Point) -> MX:
     """(14,) governing parameters in the order of GOVERNING, variables or parameters of the problem."""
     variables = (clip_to_range(point, variable) for variable in GOVERNING_VARIABLES)
     return ca.vertcat(*variables, *(point[parameter.name] for parameter in GIVEN_PARAMETERS))
-
-
-def make_stair_plan(values: SX) -> StairPlan:
-    """Plan from its governing parameters (14,)."""
-    return StairPlan(*ca.vertsplit(values))

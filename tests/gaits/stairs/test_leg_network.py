@@ -53,25 +53,6 @@ def test_the_printed_rate_does_not_converge(path: tuple[Array, Array]) -> None:
     assert (errors > 1e-6).sum() >= 4 and (steps == 500).sum() >= 4
 
 
-def test_gradients_by_weights_are_those_of_the_error() -> None:
-    """Against CasADi's derivatives, through one gradient step."""
-    rate, target = 1e-3, np.array([0.1, -0.6])
-    before, after = (train(target[None], NetworkSettings(rate=r, iterations=1))[1][0] for r in (1e-12, rate))
-    rng = np.random.default_rng(0)
-    inner, outer = ca.MX.sym("inner", 10, 2), ca.MX.sym("outer", 2, 10)
-    hip, knee = ca.vertsplit(outer @ (1 / (1 + ca.exp(-(inner @ ca.DM(target))))))
-    x = THIGH * ca.cos(hip) + SHANK * ca.cos(hip + knee)
-    z = -THIGH * ca.sin(hip) - SHANK * ca.sin(hip + knee)
-    error = (x - target[0]) ** 2 + (z - target[1]) ** 2
-    weights = [inner, outer]
-    moved = [w - rate * ca.gradient(error, w) for w in weights]
-    step = ca.Function("step", weights, [error, ca.graph_substitute([error], weights, moved)[0]])
-    start = [rng.standard_normal((10, 2)), rng.standard_normal((2, 10))]
-    expected_before, expected_after = (float(value) for value in step(*start))
-    assert before == pytest.approx(expected_before, rel=1e-6)
-    assert after == pytest.approx(expected_after, rel=1e-9)
-
-
 def test_rates_of_the_leg_move_its_ankle_as_requested() -> None:
     angles, velocity = SX.sym("angles", 2), SX.sym("velocity", 2)
     rates = compute_leg_rates(angles, velocity, THIGH, 1.2 * SHANK)
