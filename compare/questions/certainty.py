@@ -22,9 +22,8 @@ from nlp_gait.files import replace_nan
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaitbench.facts import SIX_DIGITS
 from nlp_gait.proofs.bounds import has_power_form
-from nlp_gait.proofs.branch_and_bound import TOLERANCE, Certificate, certify
-from nlp_gait.proofs.certificate import make_certificate_file
-from nlp_gait.proofs.checkpoint import PROVER
+from nlp_gait.proofs.branch_and_bound import TOLERANCE, certify
+from nlp_gait.proofs.certificate import PROVER, Certificate, make_certificate_file
 
 # Branch and bound is for this many variables, because its work grows exponentially with them; a least-power form allows nine.
 MOST_VARIABLES = 4

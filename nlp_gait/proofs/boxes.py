@@ -1,4 +1,4 @@
-"""Boxes of points: what pruning leaves of them, and halves."""
+"""Boxes of points: what pruning leaves of them."""
 
 from __future__ import annotations
 
@@ -19,13 +19,3 @@ class Remaining(NamedTuple):
     lowest: Array  # (P,) lower bound of the cost of the feasible points in the box
     cut: Numbers  # (P,) variable to cut next
     origin: Numbers  # (P,) indices of the boxes that were pruned to these
-
-
-def halve(boxes: Array, cut: Numbers) -> Array:
-    """Return (2 P, n, 2): each box cut in the middle of an edge, first all lower halves."""
-    index = np.arange(len(boxes)), cut
-    middle = 0.5 * boxes[(*index, 0)] + 0.5 * boxes[(*index, 1)]
-    low, high = boxes.copy(), boxes.copy()
-    low[(*index, 1)] = middle
-    high[(*index, 0)] = middle
-    return np.concatenate([low, high])

@@ -11,6 +11,7 @@ Source:
 
 from __future__ import annotations
 
+import hashlib
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,39 +21,40 @@ import numpy as np
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import hash_json, identify_problem, make_key
 from nlp_gait.errors import InputError
+from nlp_gait.files import read_bytes, replace_file
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.interrupts import Progress, ignore_progress
 from nlp_gait.proofs.bounds import Bounds, make_bounds
-from nlp_gait.proofs.boxes import halve
-from nlp_gait.proofs.checkpoint import PROVER, Tree, read_checkpoint, write_checkpoint
+from nlp_gait.proofs.boxes import Numbers
+from nlp_gait.proofs.certificate import PROVER, Certificate
 
 # Number of boxes that are halved together, at least: this, or one in SHARE of the open ones, so that sorting costs little.
 BATCH, SHARE = 1024, 8
 CHECKPOINT_S = 30.0
+HASH_SIZE, LARGEST_CHECKPOINT = 32, 2**31  # bytes; ten million open boxes of nine variables
 TOLERANCE = 1e-6  # six digits
 
 
-@dataclass(frozen=True, kw_only=True)
-class Certificate:
-    """Proven bound on the objective."""
+@dataclass
+class Tree:
+    """Open boxes (P, n, 2), each with a lower bound of its cost, the next cut and its depth; and the work so far."""
 
-    objective: float  # exact value of the incumbent, in the problem's sense
-    # No x within the variables' bounds that the judge finds feasible has a better objective; not finite if the time limit came
-    # before any bound
-    bound: float
-    tolerance: float  # requested relative distance of bound and objective
-    closed: bool  # whether that distance was reached
-    boxes: int  # number of boxes that were enclosed
-    left: int  # number of boxes neither dropped nor halved at the end
-    time_s: float  # wall time [s]
-    cpu_s: float  # processor time [s]
-    x: tuple[float, ...]  # the incumbent
+    boxes: Array
+    lowest: Array
+    cut: Numbers
+    depth: Array
+    enclosed: int = 1
+    time_s: float = 0.0
+    cpu_s: float = 0.0
 
-    @property
-    def gap(self) -> float:
-        """Relative distance of bound and objective."""
-        return abs(self.bound - self.objective) / (abs(self.objective) or 1.0)
+    def find_bound(self, target: float) -> float:
+        """Return the lower bound of the cost that is proven: that of the open boxes, at most the target."""
+        return float(self.lowest.min(initial=target))
+
+    def estimate_share_left(self) -> float:
+        """Return the open share of the tree, as if both halves of a box were equal work."""
+        return float(np.exp2(-self.depth.astype(float)).sum())
 
 
 def certify(
@@ -76,7 +78,7 @@ def certify(
 
     Raises:
         InputError: the incumbent is not feasible, tolerance or time limit are not positive, or the checkpoint is damaged or
-            belongs to another problem, incumbent, tolerance or version of the prover.
+            of another problem, incumbent, tolerance or version of the prover.
         CompilerError: there is no compiler, or it fails.
     """
     if not (0.0 < tolerance < 1.0 and time_limit_s > 0.0):
@@ -89,9 +91,10 @@ def certify(
     key = make_key(identify_problem(problem))
     proof = hash_json({**key, "x": x.tolist(), "tolerance": tolerance, "prover": PROVER})
     if checkpoint is not None and checkpoint.exists():
-        tree = read_checkpoint(checkpoint, proof, bounds.root.shape[1])
+        tree = _read_checkpoint(checkpoint, proof, bounds.root.shape[1])
     else:
-        tree = _plant_tree(bounds, target)
+        whole = bounds.prune(bounds.root, target)
+        tree = Tree(whole.boxes, whole.lowest, whole.cut, np.zeros(len(whole.origin)))
     saved, deadline = started, started + time_limit_s
     started, used = started - tree.time_s, used - tree.cpu_s  # of earlier runs
     while len(tree.lowest) and time.perf_counter() < deadline:
@@ -103,10 +106,10 @@ def certify(
         if checkpoint is not None and time.perf_counter() - saved > CHECKPOINT_S:
             saved = time.perf_counter()
             tree.time_s, tree.cpu_s = saved - started, time.process_time() - used
-            write_checkpoint(checkpoint, proof, tree)
+            _write_checkpoint(checkpoint, proof, tree)
     tree.time_s, tree.cpu_s = time.perf_counter() - started, time.process_time() - used
     if checkpoint is not None:
-        write_checkpoint(checkpoint, proof, tree)
+        _write_checkpoint(checkpoint, proof, tree)
     return Certificate(
         objective=sign * cost,
         bound=sign * tree.find_bound(target),
@@ -132,16 +135,11 @@ def _evaluate_feasible(problem: GaitProblem, x: Array) -> float:
     return exact.cost
 
 
-def _plant_tree(bounds: Bounds, target: float) -> Tree:
-    whole = bounds.prune(bounds.root, target)
-    return Tree(boxes=whole.boxes, lowest=whole.lowest, cut=whole.cut, depth=np.zeros(len(whole.origin)))
-
-
 def _halve_best(tree: Tree, bounds: Bounds, target: float) -> None:
     order = np.argsort(tree.lowest, kind="stable")
     batch = max(BATCH, len(order) // SHARE)
     chosen, kept = order[:batch], order[batch:]
-    new = halve(tree.boxes[chosen], tree.cut[chosen])
+    new = _halve(tree.boxes[chosen], tree.cut[chosen])
     tree.enclosed += len(new)
     remaining = bounds.prune(new, target)
     depth = np.tile(tree.depth[chosen] + 1, 2)[remaining.origin]
@@ -150,3 +148,40 @@ def _halve_best(tree: Tree, bounds: Bounds, target: float) -> None:
     tree.lowest = np.concatenate([tree.lowest[kept], np.maximum(remaining.lowest, inherited)])
     tree.cut = np.concatenate([tree.cut[kept], remaining.cut])
     tree.depth = np.concatenate([tree.depth[kept], depth])
+
+
+def _halve(boxes: Array, cut: Numbers) -> Array:
+    """Return (2 P, n, 2): each box cut in the middle of an edge, first all lower halves."""
+    index = np.arange(len(boxes)), cut
+    middle = 0.5 * boxes[(*index, 0)] + 0.5 * boxes[(*index, 1)]
+    low, high = boxes.copy(), boxes.copy()
+    low[(*index, 1)] = middle
+    high[(*index, 0)] = middle
+    return np.concatenate([low, high])
+
+
+def _write_checkpoint(path: Path, proof: str, tree: Tree) -> None:
+    """Write a hash and rows of doubles atomically: the work, then each open box with its bound, cut and depth."""
+    count, n, _ = tree.boxes.shape
+    rows = np.column_stack([tree.boxes.reshape(count, 2 * n), tree.lowest, tree.cut, tree.depth])
+    work = np.zeros((1, rows.shape[1]))
+    work[0, :3] = tree.enclosed, tree.time_s, tree.cpu_s
+    content = np.concatenate([work, rows]).astype("<f8").tobytes()
+    with replace_file(path) as temporary:
+        temporary.write_bytes(_hash_checkpoint(proof, content) + content)
+
+
+def _read_checkpoint(path: Path, proof: str, n: int) -> Tree:
+    remedy = "delete it to start the proof again"
+    raw = read_bytes(path, "checkpoint", at_most=LARGEST_CHECKPOINT, remedy=remedy)
+    digest, content = raw[:HASH_SIZE], raw[HASH_SIZE:]
+    if digest != _hash_checkpoint(proof, content):
+        other = "it is damaged, or of another problem, incumbent, tolerance or version of the prover"
+        raise InputError(f"checkpoint {str(path)!r}: {other}; {remedy}")
+    (work, *_), rows = np.split(np.frombuffer(content, dtype="<f8").reshape(-1, 2 * n + 3).astype(np.float64), [1])
+    boxes, lowest, cut, depth = rows[:, :-3].reshape(-1, n, 2), rows[:, -3], rows[:, -2], rows[:, -1]
+    return Tree(boxes, lowest, cut.astype(np.intp), depth, int(work[0]), *work[1:3].tolist())
+
+
+def _hash_checkpoint(proof: str, content: bytes) -> bytes:
+    return hashlib.sha256(proof.encode() + content).digest()

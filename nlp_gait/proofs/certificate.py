@@ -1,4 +1,4 @@
-"""Certificates: files of proven bounds, and the shipped ones. Proving again is the only check that excludes every false bound."""
+"""Certificates: proven bounds, their files, and the shipped ones. Only proving again excludes every false bound."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,10 +12,33 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors, read_json
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.proofs.branch_and_bound import Certificate
-from nlp_gait.proofs.checkpoint import PROVER
 
 CERTIFICATES = Path(str(files("nlp_gait.proofs") / "certificates"))
+# Version of the prover, written into certificates and checkpoints: raise it by hand where a change of this package decides what
+# remains of a box, or what a proof is.
+PROVER = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certificate:
+    """Proven bound on the objective."""
+
+    objective: float  # exact value of the incumbent, in the problem's sense
+    # No x within the variables' bounds that the judge finds feasible has a better objective; not finite if the time limit came
+    # before any bound
+    bound: float
+    tolerance: float  # requested relative distance of bound and objective
+    closed: bool  # whether that distance was reached
+    boxes: int  # number of boxes that were enclosed
+    left: int  # number of boxes neither dropped nor halved at the end
+    time_s: float  # wall time [s]
+    cpu_s: float  # processor time [s]
+    x: tuple[float, ...]  # the incumbent
+
+    @property
+    def gap(self) -> float:
+        """Relative distance of bound and objective."""
+        return abs(self.bound - self.objective) / (abs(self.objective) or 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)

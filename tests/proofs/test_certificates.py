@@ -12,8 +12,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs.bounds import make_bounds
 from nlp_gait.proofs.branch_and_bound import certify
-from nlp_gait.proofs.certificate import load_certificates
-from nlp_gait.proofs.checkpoint import PROVER
+from nlp_gait.proofs.certificate import PROVER, load_certificates
 from tests.proofs.soundness import best_x, count_lost_boxes, load, narrow_around
 
 SEED = 2

@@ -54,10 +54,10 @@ def test_the_planned_climb_needs_the_torques_of_the_engine(climb: Result) -> Non
     planned = plan.signals.arrays["tau"][at][:, compared]
     assert np.abs(planned).max() > 50.0 and np.abs(rear).max() > 20.0
     np.testing.assert_allclose(torques[at][:, compared], planned, atol=AGREEMENT_NM)
-    # These are the model's own torques, joint for joint but for the sense of the stance leg's lower two.
+    # These are the model's own torques, joint for joint but for the sense of the stance ankle.
     model = own.arrays["tau"][new]
     columns = [list(own.joints).index(name) for name in ("hip'", "knee'", "ankle'", "hip", "knee", "ankle", "toe")]
-    senses = np.array([1, -1, -1, 1, 1, 1, 1])
+    senses = np.array([1, 1, -1, 1, 1, 1, 1])
     np.testing.assert_allclose(planned, senses * model[:, columns], atol=AGREEMENT_NM)
 
 
