@@ -1,4 +1,4 @@
-"""Points of collision shapes: primitives, and the corners of STL, OBJ and Collada files, read in a limited child process.
+"""Points of collision shapes: primitives, and the corners of STL, OBJ and Collada files.
 
 Nothing but corners is read, and hostile files are refused; libraries for meshes expand XML entities and skip damaged parts.
 """
@@ -6,7 +6,6 @@ Nothing but corners is read, and hostile files are refused; libraries for meshes
 import math
 import os
 import re
-import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
@@ -15,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import RobotDataError, WorkerError
+from nlp_gait.errors import RobotDataError
 from nlp_gait.files import read_bytes
-from nlp_gait.processes import has_fork, run_alone
 from nlp_gait.robots.robot import are_plausible
 from nlp_gait.robots.tree import Array, rotate
 
@@ -113,12 +111,7 @@ def move_points(points: Array, pose: Array) -> Array:
 
 
 def read_mesh_points(path: Path) -> Array:
-    """Read the corners (N, 3) of a mesh in the file's unit, of Collada in metres, in a child process; raises RobotDataError."""
-    data = read_in_child(f"mesh {str(path)!r}", lambda: np.asarray(_read_points(path), float).tobytes())
-    return np.frombuffer(data).reshape(-1, 3).copy()
-
-
-def _read_points(path: Path) -> Array:
+    """Read the corners (N, 3) of a mesh in the file's unit, of Collada in metres; raises RobotDataError."""
     data = read_bytes(path, "mesh", error=RobotDataError)
     check_pointer(path, data)
     readers: dict[str, Callable[[bytes], Array]] = {
@@ -135,7 +128,7 @@ def _read_points(path: Path) -> Array:
         raise RobotDataError(f"mesh {str(path)!r} is damaged: {' '.join(str(error).split())[:200]}") from error
     if not len(points) or not are_plausible(points):
         raise RobotDataError(f"mesh {str(path)!r} has no points, or points that are not finite")
-    return points
+    return np.asarray(points, dtype=float)
 
 
 def check_pointer(path: Path, data: bytes) -> None:
@@ -211,38 +204,3 @@ def _transform(node: Any) -> Array:
     else:
         pose[:3, :3] = rotate(np.array(values[:3]) / np.linalg.norm(values[:3]), math.radians(values[3]))
     return pose
-
-
-TIME_LIMIT_S = 60.0
-MEMORY_LIMIT_BYTES = 4 * 2**30
-LARGEST_RESULT = 256 * 2**20  # bytes
-
-
-def read_in_child(owner: str, read: Callable[[], bytes]) -> bytes:
-    """Return what ``read`` returns, in a forked process with limits of time and memory; Ctrl-C ends it at once.
-
-    Where this process may not fork (on Windows, in workers of a pool), it is called in this one, without limits. ``owner`` is
-    the kind and name of the file, for messages. Raises RobotDataError as ``read`` may, or if it took too much time or memory, or
-    its process died.
-    """
-    if not has_fork():
-        return read()
-    memory = f"more than {MEMORY_LIMIT_BYTES // 2**30} GiB of memory"
-    fault = f"{owner} probably needs {memory} to be read; simplify the file"
-
-    def call(_: Callable[[object], None]) -> bytes:
-        try:
-            content = read()
-        except MemoryError:
-            raise RobotDataError(fault) from None
-        if len(content) > LARGEST_RESULT:
-            raise RobotDataError(f"{owner} holds more than {LARGEST_RESULT // 2**20} MiB of data; simplify the file")
-        return content
-
-    latest = time.monotonic() + TIME_LIMIT_S
-    try:
-        return run_alone(call, lambda: time.monotonic() > latest, memory_bytes=MEMORY_LIMIT_BYTES)
-    except TimeoutError:
-        raise RobotDataError(f"{owner} was not read within {TIME_LIMIT_S:g} s; simplify the file") from None
-    except WorkerError as error:
-        raise RobotDataError(f"{owner} cannot be read: {error}; it may need {memory}; simplify the file") from error

@@ -4,7 +4,9 @@ import json
 import logging
 import math
 import re
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
@@ -13,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import MissingExtraError, RobotDataError
+from nlp_gait.errors import MissingExtraError, RobotDataError, WorkerError
+from nlp_gait.processes import has_fork, run_alone
 from nlp_gait.robots.meshes import (
     POINTER,
     check_pointer,
     list_shape_points,
     move_points,
-    read_in_child,
     read_model,
 )
 from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
@@ -27,6 +29,8 @@ from nlp_gait.robots.tree import Array, Mass, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
 LOG = logging.getLogger("nlp_gait")
+TIME_LIMIT_S, MEMORY_LIMIT_BYTES = 60.0, 4 * 2**30  # to compile a model
+LARGEST_RESULT = 256 * 2**20  # bytes
 JOINT_FREE, JOINT_HINGE, JOINT_TRANSMISSIONS = 0, 3, (0, 1)  # mjJNT_FREE, _HINGE; mjTRN_JOINT and mjTRN_JOINTINPARENT
 
 
@@ -154,7 +158,7 @@ def _compile(path: str) -> Any:
         )
     read_model(path)  # refuses special files
     mujoco = import_module("mujoco")  # before the fork, which would import it in vain
-    texts, _, data = read_in_child(f"robot file {path!r}", partial(_compile_binary, mujoco, path)).partition(b"\n")
+    texts, _, data = (_compile_in_child if has_fork() else _compile_binary)(mujoco, path).partition(b"\n")
     warnings, files = json.loads(texts)
     for text in warnings:
         LOG.warning("robot file %r: %s", path, text)
@@ -166,6 +170,28 @@ def _compile(path: str) -> Any:
         return model
     except Exception as error:
         raise _convert(path, error) from error
+
+
+def _compile_in_child(mujoco: Any, path: str) -> bytes:
+    """Call ``_compile_binary`` in a forked process with limits of time and memory; Ctrl-C ends it at once."""
+    memory = f"more than {MEMORY_LIMIT_BYTES // 2**30} GiB of memory"
+
+    def call(_: Callable[[object], None]) -> bytes:
+        with suppress(MemoryError):
+            content = _compile_binary(mujoco, path)
+            if len(content) <= LARGEST_RESULT:
+                return content
+        raise RobotDataError(f"robot file {path!r} probably needs {memory} to be read; simplify the file")
+
+    latest = time.monotonic() + TIME_LIMIT_S
+    try:
+        return run_alone(call, lambda: time.monotonic() > latest, memory_bytes=MEMORY_LIMIT_BYTES)
+    except TimeoutError:
+        raise RobotDataError(f"robot file {path!r} was not read within {TIME_LIMIT_S:g} s; simplify the file") from None
+    except WorkerError as error:
+        raise RobotDataError(
+            f"robot file {path!r} cannot be read: {error}; it may need {memory}; simplify the file"
+        ) from error
 
 
 def _compile_binary(mujoco: Any, path: str) -> bytes:

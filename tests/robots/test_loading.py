@@ -1,7 +1,6 @@
 """Robot files: the three NAOs, and a message for everything that can be wrong."""
 
 import json
-import multiprocessing
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,6 @@ import pytest
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots import list_robots, load_robot
-from nlp_gait.robots.meshes import read_mesh_points
 from tests.robots.custom import written
 
 
@@ -120,11 +118,3 @@ def test_a_file_that_extends_a_robot_replaces_single_records(tmp_path: Path) -> 
     heavy = load_robot(written(tmp_path, raw))
     assert heavy.mass_kg == pytest.approx(base.mass_kg - base.links["LThigh"].mass_kg + 9.0)
     assert heavy.joints == base.joints
-
-
-def test_a_worker_of_a_pool_reads_meshes(tmp_path: Path) -> None:
-    """It may have no children."""
-    file = tmp_path / "sole.obj"
-    file.write_text("v 0 0 0\nv 1 0 0\nv 0 2 0\n")
-    with multiprocessing.get_context("fork").Pool(1) as pool:
-        assert pool.apply(read_mesh_points, [file]).tolist() == [[0, 0, 0], [1, 0, 0], [0, 2, 0]]

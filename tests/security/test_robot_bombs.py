@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.robots import load_robot, meshes
+from nlp_gait.robots import load_robot, mjcf
 from nlp_gait.robots.meshes import read_mesh_points
 from nlp_gait.robots.mjcf import read_mjcf
 
@@ -48,8 +48,8 @@ BOMBS = (
 
 @pytest.mark.parametrize("text", BOMBS)
 def test_a_model_that_takes_too_much_is_rejected(tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(meshes, "TIME_LIMIT_S", TIME_S)
-    monkeypatch.setattr(meshes, "MEMORY_LIMIT_BYTES", MEMORY_BYTES)
+    monkeypatch.setattr(mjcf, "TIME_LIMIT_S", TIME_S)
+    monkeypatch.setattr(mjcf, "MEMORY_LIMIT_BYTES", MEMORY_BYTES)
     for name in ("pipe", "pipe.obj"):
         os.mkfifo(tmp_path / name)
     (tmp_path / "more.xml").write_text('<mujocoinclude><size nkey="2000000000"/></mujocoinclude>')
