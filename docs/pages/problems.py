@@ -40,8 +40,7 @@ KEYS = ("variables", "lifted", "constraints", "equations", "jacobian", "hessian"
 SIZES_INTRODUCTION = """## Sizes of the NLPs
 
 What NLP solvers receive with default options: scaled variables and those of lifted operations, the lower triangle of the Hessian;
-measured by `python -m docs.nlp_sizes`. `nlp-gait export PROBLEM --to solver --out DIR` writes one as
-C++ [for control engineers](../../control-engineer.md#the-nlp)."""
+measured by `python -m docs.nlp_sizes`."""
 INSTANCES = """## Instances of GaitBench
 
 An asterisk marks those of the subset `small`. *Feasible* is the share of 100,000 uniform points, *cost* the processor time of

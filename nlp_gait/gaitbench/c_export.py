@@ -2,16 +2,17 @@
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
 from pathlib import Path
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, read_native_source, write_rows_source
-from nlp_gait.export.c_files import format_comment, write_c_files
+from nlp_gait.files import check_output, make_writable_folder, write_text
 from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.instance import Instance
 
-# Name of each file by its template; the C++ file is put together from the kernel.
+# Template of each file, whose words ``@WORD@`` are replaced; the C++ file is put together from the kernel.
 TEMPLATES = {
     "{prefix}.h": "objective.h.in",
     "main.c": "main.c.in",
@@ -25,9 +26,19 @@ TEMPLATES = {
 def export_objective(instance: Instance, folder: Path, force: bool = False) -> list[Path]:
     """Write source, header, example, callers and build line of an instance in physical units; raises OutputError."""
     instance = Instance(instance.id)
-    return write_c_files(
-        folder, "nlp_gait.gaitbench", TEMPLATES, _make_words(instance), make_cpp_source(instance), force
-    )
+    words, native = _make_words(instance), files("nlp_gait.gaitbench") / "native"
+    texts = {f"{words['PREFIX']}.cpp": make_cpp_source(instance)}
+    for name, template in TEMPLATES.items():
+        text = (native / template).read_text(encoding="utf-8")
+        for word, value in words.items():
+            text = text.replace(f"@{word}@", value)
+        texts[name.format(prefix=words["PREFIX"])] = text
+    paths = {make_writable_folder(folder) / name: text for name, text in texts.items()}
+    for path in paths:
+        check_output(path, force)
+    for path, text in paths.items():
+        write_text(path, text)
+    return list(paths)
 
 
 def make_prefix(id: str) -> str:
@@ -94,15 +105,20 @@ def _make_words(instance: Instance) -> Mapping[str, str]:
         "UPPER": ", ".join(map(repr, instance.upper.tolist())),
         "NAMES": "\n".join(f"  '{name}'" for name in instance.names),
         "BEST_X": ", ".join(map(repr, instance.best_x.tolist())),
-        "VARIABLES": format_comment(
+        "VARIABLES": _format_comment(
             f"{k:4d}  {v.name} [{v.unit}] from {low:g} to {high:g}: {v.description}"
             for k, (v, low, high) in enumerate(zip(problem.variables, instance.lower, instance.upper, strict=True))
         ),
-        "PARAMETERS": format_comment(
+        "PARAMETERS": _format_comment(
             f"{q.name} = {value:g} [{q.unit}]: {q.description}"
             for q, value in zip(problem.own_parameters, problem.p, strict=False)
         ),
     }
+
+
+def _format_comment(lines: Iterable[str]) -> str:
+    """Return lines for an open comment of C."""
+    return "\n".join(f" *   {line}".replace("*/", "* /") for line in lines)
 
 
 def _format_numbers(values: Array) -> str:

@@ -113,7 +113,7 @@ def test_instances_are_problems_everywhere(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("line", "suffixes"),
-    [(f"export {ID} --to objective", ".c .cpp .h .jl .m .sh"), ("export walk12 --to solver", ".c .cpp .h .sh")],
+    [(f"export {ID} --to objective", ".c .cpp .h .jl .m .sh")],
 )
 def test_export_writes_and_says_what(line: str, suffixes: str, tmp_path: Path) -> None:
     files = list(map(Path, as_json(*line.split(), "--out", tmp_path / "c")["files"]))
