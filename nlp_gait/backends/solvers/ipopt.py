@@ -17,6 +17,7 @@ import numpy as np
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, NLP_VALUES, CompiledNlp
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solvers.solver import (
+    LONGEST_INFEASIBLE,
     REASONS,
     IterationWatch,
     Solver,
@@ -190,7 +191,7 @@ class Ipopt(Solver):
         self.near = self.warm
         if model.smoothed:
             self.near = WatchedSolver(ca.nlpsol("near", "ipopt", nlp, {**options, **derivatives, **near}), self.watch)
-        self.cold: WatchedSolver | WorkingSet = WatchedSolver(all_rows, self.watch)
+        self.cold: WatchedSolver | WorkingSet = WatchedSolver(all_rows, self.watch, LONGEST_INFEASIBLE)
         if settings.few_rows and nlp["g"].shape[0] >= LEAST_ROWS:
             self.cold = self._make_working_set(problem, {**general, **brief})
         self._patient = nlp, {**options, **derivatives}
@@ -224,8 +225,8 @@ class Ipopt(Solver):
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
         """Run all stages from a start point (n,), each of which starts from the last one; see ``Solver``.
 
-        Where the first stage does not converge within a short restoration of feasibility, it starts again from half way to the
-        middle of the bounds; and if that fails, too, from the start point without this limit, on all rows.
+        Where the first stage stays far from feasible, or takes long to restore feasibility, it starts again from half way to
+        the middle of the bounds; and if that fails, too, from the start point without these limits, on all rows.
         """
         half_way = (x0 + (problem.lower + problem.upper) / 2) / 2
         attempts = [

@@ -14,7 +14,7 @@ from casadi import MX
 from numpy.typing import NDArray
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, NO_OTHERS
-from nlp_gait.backends.solvers.solver import IterationWatch, WatchedSolver
+from nlp_gait.backends.solvers.solver import LONGEST_INFEASIBLE, IterationWatch, WatchedSolver
 from nlp_gait.formulation import Array
 
 Rows = NDArray[np.bool_]
@@ -110,4 +110,4 @@ class WorkingSet:
             derivatives["hess_lag"] = ca.Function(DERIVATIVES["hess_lag"], [x, p, weight, weights], [hessian])
         watch = IterationWatch(nlp, self._watch.limits)
         options = {**self._options, **NO_OTHERS, **derivatives, "iteration_callback": watch}
-        return WatchedSolver(ca.nlpsol("some_rows", "ipopt", nlp, options), watch)
+        return WatchedSolver(ca.nlpsol("some_rows", "ipopt", nlp, options), watch, LONGEST_INFEASIBLE)

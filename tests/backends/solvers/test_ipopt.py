@@ -148,8 +148,9 @@ def test_a_start_from_which_feasibility_is_not_restored_soon_is_moved_towards_th
     assert found.x0.tolist() == x0.tolist()
 
 
-def test_no_start_takes_many_more_iterations_than_the_others() -> None:
-    solution = solve(load("nao-ssp"), starts=20, seed=0)
+@pytest.mark.parametrize("name", ["nao-ssp", "humanoid-ssp"])
+def test_no_start_takes_many_more_iterations_than_the_others(name: str) -> None:
+    solution = solve(load(name), starts=20, seed=0)
     iterations = [start.iterations for start in solution.starts]
     assert all(start.converged for start in solution.starts)
     assert max(iterations) <= 4 * np.median(iterations)
