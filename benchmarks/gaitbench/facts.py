@@ -25,8 +25,8 @@ from nlp_gait import gaitbench
 from nlp_gait.decoding import decode
 from nlp_gait.files import write_json
 from nlp_gait.formulation import Array
-from nlp_gait.gaitbench.best_known import SAME, make_probes, make_strictly_feasible
-from nlp_gait.gaitbench.facts import Evidence, Facts
+from nlp_gait.gaitbench.best_known import SAME, evaluate_interpreted, make_strictly_feasible
+from nlp_gait.gaitbench.facts import Evidence, Facts, Probe
 from nlp_gait.gaitbench.instance import Instance
 from nlp_gait.proofs.certificate import load_certificates
 
@@ -137,6 +137,18 @@ def find_facts(id: str, effort: Effort, published: Facts | None) -> Facts:
         evaluation_us=evaluation_us(instance, X[:TIMED]),
         probes=make_probes(instance, best) if published is None else published.probes,
     )
+
+
+def make_probes(instance: Instance, best: Array) -> tuple[Probe, ...]:
+    """Return values at random points, between them and the best one, and at the best one."""
+    rng = np.random.default_rng(20260101)
+    draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))
+    probes = []
+    for x in np.concatenate([draws[:2], best + np.array([[0.3], [0.02]]) * (draws[2:] - best), best[None]]):
+        f, G = evaluate_interpreted(instance, x)
+        rows, violation = float(G @ (1.0 + np.arange(len(G)) % 7)), float(np.maximum(G, 0.0).sum())
+        probes.append(Probe(x=tuple(x.tolist()), objective=f, violation=violation, rows=rows))
+    return tuple(probes)
 
 
 def relative(cost: float, reference: float) -> float:

@@ -1,9 +1,9 @@
-"""The best known point of an ``Instance``, strictly feasible, by IPOPT from random starts, and values that identify it."""
+"""The best known point of an ``Instance``, strictly feasible, by IPOPT from random starts."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
 from dataclasses import asdict
-from itertools import pairwise
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,35 +14,20 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder, replace_nan, write_json
-from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.gaitbench.facts import Evidence, Facts, Probe, find_shipped_facts
+from nlp_gait.formulation import Array
+from nlp_gait.gaitbench.facts import Evidence, Facts, find_shipped_facts
 from nlp_gait.gaitbench.generated import STARTS, is_generated, parse_id
 
-# Of values that identify an instance, in units of a row's scale, or of their size where that is larger.
-AGREEMENT = 1e-9
+if TYPE_CHECKING:
+    from nlp_gait.gaitbench.instance import Instance
+
 SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
 # Slack of the best known point in every row, in units of its scale: no machine's rounding makes it infeasible.
 SLACK = 1e-10
 MOST_ROUNDS = 4  # of the starts, until one of them converges
 
 
-class Judged(Protocol):
-    """What is needed of an ``Instance`` here."""
-
-    id: str
-    gait_problem: GaitProblem
-    lower: Array
-    upper: Array
-
-    @property
-    def sides(self) -> Callable[[Array], Array]:
-        """Function of the kernel's rows (P, ...) that returns the rows G (P, m)."""
-
-    def jacobian(self, x: Array) -> Array:
-        """Return the derivatives (m, n) of the rows."""
-
-
-def find_facts(instance: Judged) -> Facts:
+def find_facts(instance: Instance) -> Facts:
     """Return the facts about an instance: shipped ones, or those of this call or of an earlier one on this machine.
 
     Raises InputError if no start of IPOPT converged, so that the instance has no best known point.
@@ -60,7 +45,7 @@ def find_facts(instance: Judged) -> Facts:
     return facts
 
 
-def compute_facts(instance: Judged, starts: int) -> Facts:
+def compute_facts(instance: Instance, starts: int) -> Facts:
     """Return the best point of IPOPT from random starts and its evidence; raises InputError if no start converges."""
     problem = instance.gait_problem
     for seed in range(MOST_ROUNDS):
@@ -78,22 +63,19 @@ def compute_facts(instance: Judged, starts: int) -> Facts:
                     starts=starts * (seed + 1),
                     agreeing=sum(abs(c - best_known) <= SAME * abs(best_known) for c in costs),
                 ),
-                # costs that differ from the next lower one by more than 1e-4 of it
-                local_optima=1 + sum(b - a > 1e-4 * abs(a) for a, b in pairwise(sorted(costs))),
-                probes=make_probes(instance, best),
             )
     raise InputError(
         f"{instance.id}: none of {starts * MOST_ROUNDS} starts of IPOPT converged to a feasible point; choose another seed"
     )
 
 
-def evaluate_interpreted(instance: Judged, x: Array) -> tuple[float, Array]:
+def evaluate_interpreted(instance: Instance, x: Array) -> tuple[float, Array]:
     """Return cost and rows (m,) at x (n,) without compiling anything."""
     values = build_exact_model(instance.gait_problem).at(x, instance.gait_problem.p)
     return values.cost, instance.sides(values.g[None])[0]
 
 
-def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
+def make_strictly_feasible(instance: Instance, x: Array) -> Array | None:
     """Return the nearest point with a slack in every row, by linear programs with the smallest possible step, or None.
 
     IPOPT may leave a row violated by about 1e-8; the best known point has a violation of exactly zero. The programs ignore the
@@ -126,30 +108,3 @@ def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
                 break
             x = np.clip(x + radius * width * step.x[:n], instance.lower, instance.upper)
     return min(ends, key=lambda item: item[0])[1] if ends else None
-
-
-def check_shipped_facts(instance: Judged) -> None:
-    """Compare the values of an instance with those in its shipped facts, if it has any; raises InputError."""
-    facts = find_shipped_facts(instance.id)
-    for number, probe in enumerate(() if facts is None else facts.probes, 1):
-        now = asdict(_make_probe(instance, np.array(probe.x)))
-        for name, before in asdict(probe).items():
-            if name != "x" and not abs(now[name] - before) <= AGREEMENT * max(1.0, abs(before)):
-                raise InputError(
-                    f"{instance.id} has changed: {name} at probe {number} is {now[name]:.10g}, not {before:.10g}; its best known "
-                    "point and its evidence are not used"
-                )
-
-
-def make_probes(instance: Judged, best: Array) -> tuple[Probe, ...]:
-    """Return values at random points, between them and the best one, and at the best one."""
-    rng = np.random.default_rng(20260101)
-    draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))
-    X = np.concatenate([draws[:2], best + np.array([[0.3], [0.02]]) * (draws[2:] - best), best[None]])
-    return tuple(_make_probe(instance, x) for x in X)
-
-
-def _make_probe(instance: Judged, x: Array) -> Probe:
-    f, G = evaluate_interpreted(instance, x)
-    rows = float(G @ (1.0 + np.arange(len(G)) % 7))
-    return Probe(x=tuple(x.tolist()), objective=f, violation=float(np.maximum(G, 0.0).sum()), rows=rows)

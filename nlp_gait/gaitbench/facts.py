@@ -108,11 +108,10 @@ class Facts:
     best_known: float  # least feasible objective known, in the sense of minimisation
     best_x: tuple[float, ...]  # (n,) its point; its violation is exactly zero
     evidence: Evidence
-    probes: tuple[Probe, ...]
+    probes: tuple[Probe, ...] = ()  # of GaitBench 1
     feasible_share: float = math.nan  # of 100 000 uniform random points; NaN for generated instances
     # processor time of one evaluation in a batch of many, on one core of the machine that made the suite [us]; likewise
     evaluation_us: float = math.nan
-    local_optima: int = 1  # different objectives at which starts of IPOPT ended; 1 where they were not counted
 
 
 @cache

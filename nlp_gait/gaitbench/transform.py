@@ -9,7 +9,6 @@ import casadi as ca
 import numpy as np
 from casadi import DM
 
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, Point, Start, Variable, make_parameters
 from nlp_gait.formulation.assembly import Expression, PointOf
 from nlp_gait.formulation.gait_problem import draw_uniform
@@ -83,25 +82,21 @@ def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProb
     )
 
 
-def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[str] = ()) -> GaitProblem:
-    """Return the problem in the variables z of an affine map, whose current bounds of x are rows.
+def change_variables(problem: GaitProblem, affine: AffineMap) -> GaitProblem:
+    """Return the problem in the variables z1, z2, ... of an affine map, whose current bounds of x are rows.
 
-    Objective, feasible set and optimum stay what they are; only where they are in the box of z changes. By default the variables
-    are z1, z2, ... Raises InputError if the map has another number of them.
+    Objective, feasible set and optimum stay what they are; only where they are in the box of z changes.
     """
-    n = len(problem.names)
-    if affine.matrix.shape != (n, n):
-        raise InputError(f"an affine map of {problem.name} must be {n} x {n}, got {affine.matrix.shape}")
     old, low, scale = problem.names, problem.lower, problem.scale
     bounds = {
         f"{v}.{end}": float(bound)
         for end in ("lower", "upper")
         for v, bound in zip(old, getattr(problem, end), strict=True)
     }
-    rows = zip(names or [f"z{k + 1}" for k in range(n)], affine.lower, affine.upper, affine.matrix.T, strict=True)
+    columns = zip(affine.lower, affine.upper, affine.matrix.T, strict=True)
     variables = [
-        Variable(name=name, unit="1", lower=float(a), upper=float(b), description=describe(problem, row))
-        for name, a, b, row in rows
+        Variable(name=f"z{k}", unit="1", lower=float(a), upper=float(b), description=describe(problem, column))
+        for k, (a, b, column) in enumerate(columns, 1)
     ]
     start = problem.hints.start
     base = problem.with_values()
@@ -130,7 +125,7 @@ def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[st
     def refine(factor: int) -> GaitProblem:
         finer = base.dense(factor)
         assert finer is not None  # for the type checker
-        return change_variables(finer, affine, names)
+        return change_variables(finer, affine)
 
     return replace_variables(
         problem,

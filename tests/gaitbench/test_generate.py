@@ -64,8 +64,8 @@ def test_other_variables_keep_objective_rows_and_feasible_set() -> None:
         lower=np.full(4, -0.2),
         upper=np.ones(4),
     )
-    changed = change_variables(base, affine, ["a", "b", "c", "d"])
-    assert changed.names == ("a", "b", "c", "d") and changed.value("lambda") == base.value("lambda")
+    changed = change_variables(base, affine)
+    assert changed.names == ("z1", "z2", "z3", "z4") and changed.value("lambda") == base.value("lambda")
     z = rng.uniform(affine.lower, affine.upper, (20, 4))
     x = affine.forward(z)
     np.testing.assert_allclose(affine.backward(x), z, atol=1e-12)
@@ -83,10 +83,6 @@ def test_a_generated_instance_is_an_instance(walk: gaitbench.Instance) -> None:
     f, violation = walk(walk.best_x[None])
     assert violation[0] == 0.0 and f[0] == pytest.approx(walk.best_known, rel=PUBLISHED)
     assert walk.evidence.agreeing >= 9 and "10 starts of IPOPT" in str(walk.evidence)
-    assert len(walk.facts.probes) == 5
-    for probe in walk.facts.probes:
-        f, violation = walk(np.array([probe.x]))
-        assert (f[0], violation[0]) == pytest.approx((probe.objective, probe.violation), rel=PUBLISHED, abs=PUBLISHED)
     near = walk.best_x + np.random.default_rng(0).uniform(-1e-3, 1e-3, (2000, 4))
     f, violation = walk(near)
     assert f[violation == 0.0].min(initial=np.inf) >= walk.best_known - 1e-6
