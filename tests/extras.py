@@ -13,7 +13,6 @@ EXTRAS = {
     "latex2mathml": "docs",
     "nbclient": "docs",
     "playwright": "browser",
-    "pygmo": "algorithms",
     "sphinx_gallery": "docs",
     "ziglang": "docs",
 }

@@ -167,7 +167,7 @@ def test_searches_import_neither_casadi_nor_gaits(module: str) -> None:
     [
         ("import nlp_gait", "scipy.optimize matplotlib.pyplot metaheuristics compare"),
         ("import metaheuristics", "casadi nlp_gait matplotlib scipy cma pymoo"),
-        ("import nlp_gait.gaitbench as suite; suite.list_instances()", "scipy.optimize matplotlib pymoo pygmo ioh cma"),
+        ("import nlp_gait.gaitbench as suite; suite.list_instances()", "scipy.optimize matplotlib pymoo ioh cma"),
         ("from compare.cli.list import _list_all; _list_all()", "numpy casadi"),
     ],
 )

@@ -1,6 +1,5 @@
-"""What drives ours and is no part of the README's environment: pygmo and ioh."""
+"""What drives ours and is no part of the README's environment: ioh."""
 
-import copy
 from typing import Any
 
 import numpy as np
@@ -21,11 +20,6 @@ def ioh() -> Any:
 
 
 @pytest.fixture(scope="module")
-def pygmo() -> Any:
-    return need("pygmo")
-
-
-@pytest.fixture(scope="module")
 def instance() -> gaitbench.Instance:
     return gaitbench.load(ID)
 
@@ -33,24 +27,6 @@ def instance() -> gaitbench.Instance:
 @pytest.fixture(scope="module")
 def X(instance: gaitbench.Instance) -> Array:
     return np.random.default_rng(5).uniform(instance.lower, instance.upper, (40, len(instance.names)))
-
-
-def test_pygmo(pygmo: Any, instance: gaitbench.Instance, X: Array) -> None:
-    """Objective, rows and gradients; a copy in an archipelago's thread and a gradient solver work on it."""
-    problem = instance.to("pygmo")
-    assert (problem.get_nx(), problem.get_nic(), problem.has_gradient()) == (9, len(instance.row_names), True)
-    values = np.array([problem.fitness(x) for x in X])
-    np.testing.assert_array_equal(values[:, 0], instance(X)[0])
-    np.testing.assert_array_equal(values[:, 1:], instance.rows(X))
-    np.testing.assert_array_equal(problem.batch_fitness(X.ravel()), values.ravel())
-    np.testing.assert_array_equal(problem.gradient(X[0])[:9], instance.gradient(X[0]))
-    assert problem.feasibility_x(instance.best_x)
-    assert np.allclose(copy.deepcopy(problem).fitness(X[0]), values[0])
-    population = pygmo.population(problem, 0, seed=1)
-    population.push_back(instance.best_x + 0.02 * (instance.lower + instance.upper - 2 * instance.best_x))
-    solver = pygmo.algorithm(pygmo.nlopt("slsqp"))
-    found = solver.evolve(population).champion_f[0]
-    assert found == pytest.approx(instance.best_known, rel=1e-3)
 
 
 def test_ioh(ioh: Any, instance: gaitbench.Instance, X: Array) -> None:

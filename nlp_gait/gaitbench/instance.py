@@ -139,7 +139,6 @@ class Instance:
         - ``scipy``: arguments of ``scipy.optimize.minimize`` (fun, jac, bounds, constraints)
         - ``cma``: arguments of ``cma.fmin_con2``; a constraint is the worst row of a group of rows
         - ``ioh``: problem with the optimum; the total violation is a soft constraint, which adds to the objective
-        - ``pygmo``: problem with every row as an inequality, with gradients and batches
         - ``pymoo``: vectorised problem; G is the total violation, or every row with ``rows=True``
 
         Raises UnknownNameError, or MissingExtraError without the package.

@@ -73,7 +73,7 @@ def test_pycma(instance: gaitbench.Instance, tmp_path: Path, monkeypatch: pytest
     assert best is not None and instance(np.array(best)[None])[1][0] == 0.0
 
 
-@pytest.mark.parametrize("name", ["pymoo", "pygmo", "ioh", "cma"])
+@pytest.mark.parametrize("name", ["pymoo", "ioh", "cma"])
 def test_a_package_that_lacks_is_named(
     name: str, instance: gaitbench.Instance, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -79,48 +79,6 @@ def to_ioh(instance: Instance) -> Any:
     return problem
 
 
-def to_pygmo(instance: Instance) -> Any:
-    """Return a problem of pygmo."""
-    import pygmo
-
-    return pygmo.problem(_PygmoProblem(instance))
-
-
-class _PygmoProblem:
-    """The objective, then every row as an inequality, with dense gradients."""
-
-    def __init__(self, instance: Instance) -> None:
-        self.instance = instance
-
-    def fitness(self, x: Array) -> Array:
-        return self.batch_fitness(x)
-
-    def has_batch_fitness(self) -> bool:
-        return True
-
-    def batch_fitness(self, xs: Array) -> Array:
-        """Return the fitness of concatenated points, point by point."""
-        X = np.reshape(xs, (-1, len(self.instance.names)))
-        return np.hstack([self.instance(X)[0][:, None], self.instance.rows(X)]).ravel()
-
-    def gradient(self, x: Array) -> Array:
-        """Return the derivatives ((1 + m) n,), row by row."""
-        return np.vstack([self.instance.gradient(x), self.instance.jacobian(x)]).ravel()
-
-    def get_bounds(self) -> tuple[Array, Array]:
-        return self.instance.lower, self.instance.upper
-
-    def get_nic(self) -> int:
-        return len(self.instance.row_names)
-
-    def get_name(self) -> str:
-        return f"GaitBench {self.instance.id}"
-
-    def get_extra_info(self) -> str:
-        instance = self.instance
-        return f"\t{instance.definition.what}\n\tbest known: {instance.best_known!r}, {instance.evidence}"
-
-
 def to_pymoo(instance: Instance, *, rows: bool = False) -> Any:
     """Return a problem of pymoo."""
     from nlp_gait.gaitbench.adapters.pymoo import PymooProblem
@@ -133,7 +91,6 @@ ADAPTERS: dict[str, Callable[..., Any]] = {
     "scipy": to_scipy,
     "cma": to_cma,
     "ioh": to_ioh,
-    "pygmo": to_pygmo,
     "pymoo": to_pymoo,
 }
 
