@@ -25,9 +25,8 @@ from nlp_gait import gaitbench
 from nlp_gait.decoding import decode
 from nlp_gait.files import write_json
 from nlp_gait.formulation import Array
-from nlp_gait.gaitbench.best_known import SAME, evaluate_interpreted, make_strictly_feasible
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe
-from nlp_gait.gaitbench.instance import Instance
+from nlp_gait.gaitbench.instance import SAME, Instance, evaluate_interpreted, make_strictly_feasible
 from nlp_gait.proofs.certificate import load_certificates
 
 FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "facts.json"

@@ -10,8 +10,8 @@ from nlp_gait import gaitbench
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load
-from nlp_gait.gaitbench.best_known import evaluate_interpreted
 from nlp_gait.gaitbench.generated import draw_box, draw_definition, load_families
+from nlp_gait.gaitbench.instance import evaluate_interpreted
 from nlp_gait.gaitbench.transform import AffineMap, change_variables
 
 PUBLISHED = 1e-12

@@ -12,7 +12,7 @@ import pytest
 
 from nlp_gait import gaitbench
 from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE
-from nlp_gait.gaitbench import best_known
+from nlp_gait.gaitbench import instance as instances
 from nlp_gait.gaitbench.adapters import ADAPTERS
 from nlp_gait.gaitbench.facts import Facts
 
@@ -34,7 +34,7 @@ def test_python_of_the_page_runs(block: str, tmp_path: Path, monkeypatch: pytest
     monkeypatch.chdir(tmp_path)
     if "generate(" in block:
         monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))  # where its best known point is stored
-        monkeypatch.setattr(best_known, "compute_facts", partial(_compute_by_one_start, best_known.compute_facts))
+        monkeypatch.setattr(instances, "compute_facts", partial(_compute_by_one_start, instances.compute_facts))
     instance = gaitbench.load("ssp-v5")
     X = np.random.default_rng(0).uniform(instance.lower, instance.upper, (3, len(instance.names)))
     with warnings.catch_warnings():
