@@ -18,7 +18,7 @@ from nlp_gait.backends.kernel.library_cache import find_cache_folder
 from nlp_gait.backends.solve import solve
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError, check_name
-from nlp_gait.files import replace_nan, write_json
+from nlp_gait.files import make_writable_folder, replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.adapters import find_adapter
 from nlp_gait.gaitbench.facts import Evidence, Facts, find_shipped_facts

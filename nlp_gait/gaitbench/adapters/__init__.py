@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nlp_gait.errors import MissingExtraError, check_name, unknown
-from nlp_gait.formulation import Array
 
 if TYPE_CHECKING:
     from nlp_gait.gaitbench.instance import Instance
