@@ -12,7 +12,7 @@ from nlp_gait.backends.solvers.registry import SOLVERS
 
 INTRODUCTION = """# Algorithms and solvers
 
-Every name here stands wherever a command or a study asks for an algorithm, and settings are given in a study file or in Python:
+Every name here stands wherever a command asks for an algorithm, and settings are given in Python:
 `metaheuristics.make_algorithm("pso", population=80)`, `nlp_gait.make_solver("ipopt", ...)`. `nlp-gait list NAME` prints it, too.
 [Your own algorithm](../researcher.md) takes part as `FILE.py:NAME`. How often each default search comes within 0.1 % of the
 best known point stands on the [page of each problem](problems/index.md)."""
