@@ -1,6 +1,6 @@
 """Modules of tests that need a package of another extra than ``test`` are skipped without it; the reason names the extra."""
 
-from typing import Any
+from importlib.util import find_spec
 
 import pytest
 
@@ -18,9 +18,13 @@ EXTRAS = {
 }
 
 
-def need(package: str) -> Any:
-    """Import a package, or skip what asks for it: the test, the fixture's tests or the whole module."""
-    return pytest.importorskip(package, reason=f"no {package}: pip install 'nlp-gait[{EXTRAS[package]}]'")
+def need(package: str) -> None:
+    """Skip what asks for a package that is not installed: the test, the fixture's tests or the whole module.
+
+    It is not imported, since every process of pytest-xdist asks for all of them.
+    """
+    if find_spec(package) is None:
+        pytest.skip(f"no {package}: pip install 'nlp-gait[{EXTRAS[package]}]'", allow_module_level=True)
 
 
 def need_browser() -> None:

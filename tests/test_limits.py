@@ -127,11 +127,10 @@ def test_friction_and_height_are_those_of_mujoco() -> None:
     np.testing.assert_allclose([rows[f"foot_clearance[sole, {k}]"] for k in range(1, 10)], above[1:-1], atol=1e-9)
 
 
-@pytest.mark.commit
 def test_a_limit_costs_what_it_must_and_is_guaranteed_between_samples() -> None:
     problem = nlp_gait.load("nao-ssp", intervals=4)
     higher = problem.with_limits(single_support=[FootClearance()]).with_values(foot_clearance_m=0.02)
-    optimum, limited = (nlp_gait.solve(p, starts=2, seed=0) for p in (problem, higher))
+    optimum, limited = (nlp_gait.solve(p, starts=1, seed=0) for p in (problem, higher))
     assert limited.objective > optimum.objective
     (price, *_) = [active.price for active in limited.active_constraints if active.name.startswith("foot_clearance[")]
     assert price > 0.0

@@ -200,7 +200,6 @@ def test_the_page_fits_a_large_screen(opened: Visit, file: Path) -> None:
     check_page(opened, "1280 light")
 
 
-@pytest.mark.commit
 def test_the_page_fits_a_phone(browser: Any, file: Path) -> None:
     with visit(browser, file, "400 dark") as found:
         wait_until(found.page, "document.body.dataset.ready === 'yes'")

@@ -5,7 +5,6 @@ import sys
 import warnings
 from pathlib import Path
 
-import cma
 import numpy as np
 import pytest
 
@@ -59,6 +58,8 @@ def test_scipy_ends_at_the_best_known(instance: gaitbench.Instance) -> None:
 
 def test_pycma(instance: gaitbench.Instance, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The worst row of each group; with it ``fmin_con2`` gets to a feasible point."""
+    import cma  # takes a second, and so does SciPy's statistics, which it imports
+
     monkeypatch.chdir(tmp_path)  # pycma makes a folder there
     arguments = instance.to("cma")
     constraints = arguments["constraints"](instance.best_x)

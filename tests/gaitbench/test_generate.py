@@ -4,7 +4,6 @@ import pickle
 
 import numpy as np
 import pytest
-from scipy.stats import kstest
 
 from nlp_gait import gaitbench
 from nlp_gait.backends.exact import build_exact_model
@@ -101,6 +100,8 @@ def test_best_points_are_neither_at_the_bounds_nor_in_the_middle() -> None:
 @pytest.mark.parametrize("family", ["ssp", "humanoid-ssp"])
 def test_boxes_place_typical_points_uniformly(family: str) -> None:
     """Variables whose best value hardly depends on the robot are anywhere in the box with equal probability."""
+    from scipy.stats import kstest  # costs a second to import
+
     entry = load_families()[family]
     problem = load(entry.problem)
     ends = np.array([entry.typical[name] for name in problem.names])

@@ -117,18 +117,18 @@ def test_a_plan_is_feasible_and_walks_in_the_engine(tmp_path: Path) -> None:
 
 def test_a_start_shows_whether_a_grid_is_too_coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """A grid is refined where the energy differs from that on a fine one by more than a limit; fixed values stay."""
-    monkeypatch.setattr("nlp_gait.backends.plan_walk.ENERGY_ERROR", 0.001)
-    for intervals in (2, 40):
-        problem = nlp_gait.load("nao-walk", steps=3, intervals=intervals).fix(step_length_m=0.05)
-        x, said = np.clip(problem.start_point(np.random.default_rng(0)), problem.lower, problem.upper), list[str]()
-        fine = nlp_gait.load("nao-walk", steps=3, intervals=120)
-        energies = [build_exact_model(p).at(x, p.p).indexes["energy_J"] for p in (problem, fine)]
-        error = abs(energies[0] / energies[1] - 1.0)
+    monkeypatch.setattr("nlp_gait.backends.plan_walk.FINE_GRID", 24)
+    problem = nlp_gait.load("nao-walk", steps=3, intervals=2).fix(step_length_m=0.05)
+    x, said = np.clip(problem.start_point(np.random.default_rng(0)), problem.lower, problem.upper), list[str]()
+    fine = nlp_gait.load("nao-walk", steps=3, intervals=24)
+    coarse, right = (build_exact_model(p).at(x, p.p).indexes["energy_J"] for p in (problem, fine))
+    error = abs(coarse / right - 1.0)
+    for limit, refined in ((0.9 * error, True), (1.1 * error, False)):
+        monkeypatch.setattr("nlp_gait.backends.plan_walk.ENERGY_ERROR", limit)
         finer = choose_finer_grid(problem, x, WalkSettings(progress=said.append))
-        assert (error > 0.001) is (intervals == 2) is (finer is not None)
-        if finer is not None:
-            assert said == [f"2 intervals of a phase: energy {error:.1%} off, now 3"]
-            assert finer.options["intervals"] == 3 and finer.values == problem.values
+        assert (finer is not None) is refined
+        assert finer is None or (finer.options["intervals"], finer.values) == (3, problem.values)
+    assert said == [f"2 intervals of a phase: energy {error:.1%} off, now 3"]
 
 
 def test_margins_are_shares_of_the_sole_in_plans_and_not_in_problems(problem: GaitProblem) -> None:

@@ -212,12 +212,12 @@ def test_a_robot_at_rest_steps_where_no_zmp_brings_it_back_and_a_foothold_does(
         assert balance.find_plan_time(1.0) >= 0.3  # the plan waits
 
 
-def advance(run: SimulationRun) -> Array:
-    assert run.advance(0.8)
+def advance(run: SimulationRun, until_s: float) -> Array:
+    assert run.advance(until_s)
     return np.array(run.data.qpos)
 
 
-@pytest.mark.parametrize(("impulse_Ns", "share"), [((2.1, 0.0), 0.45), ((0.0, 2.1), 0.45), ((0.0, -1.8), 0.55)])
+@pytest.mark.parametrize(("impulse_Ns", "share"), [((2.1, 0.0), 0.45), ((0.0, -1.8), 0.55)])
 def test_a_pushed_walk_stands_with_it_and_falls_without(
     plan: Plan, impulse_Ns: tuple[float, float], share: float
 ) -> None:
@@ -228,20 +228,19 @@ def test_a_pushed_walk_stands_with_it_and_falls_without(
     assert alone.fell_at_s is not None and balanced.fell_at_s is None
 
 
-def test_bumps_noise_and_delay_act_and_the_same_seed_gives_the_same_walk(plan: Plan) -> None:
-    settings = Balance(noise=1.0, delay_s=0.004)
-    bumpy = Conditions(bumps=Bumps(height_m=0.004))
-    first, again, other, flat = (
-        advance(SimulationRun(plan, conditions, Drive(feedback=balance)))
-        for conditions, balance in (
-            (bumpy, settings),
-            (bumpy, settings),
-            (bumpy, replace(settings, seed=1)),
-            (Conditions(), settings),
-        )
+def test_bumps_and_noise_act_and_the_same_seed_gives_the_same_walk(plan: Plan) -> None:
+    noisy = Balance(noise=1.0, delay_s=0.004)
+    first, again, other = (
+        advance(SimulationRun(plan, Conditions(), Drive(feedback=balance)), 0.2)
+        for balance in (noisy, noisy, replace(noisy, seed=1))
     )
     np.testing.assert_array_equal(first, again)
-    assert not np.array_equal(first, other) and not np.array_equal(first, flat)
+    assert not np.array_equal(first, other)
+    bumpy, flat = (
+        advance(SimulationRun(plan, conditions), 0.5)
+        for conditions in (Conditions(bumps=Bumps(height_m=0.004)), Conditions())
+    )
+    assert not np.array_equal(bumpy, flat)
 
 
 def test_a_push_after_the_end_is_refused(standing: Plan) -> None:

@@ -21,12 +21,6 @@ TOY_TOLERANCE = 1e-6  # IPOPT's tolerance of 1e-8 times slopes of order ten
 
 
 @pytest.fixture(scope="module")
-def single_support() -> tuple[GaitProblem, Solution]:
-    problem = load("nao-ssp", intervals=5)
-    return problem, solve(problem, starts=2, seed=0)
-
-
-@pytest.fixture(scope="module")
 def double_support() -> tuple[GaitProblem, Solution]:
     problem = load("nao-dsp", intervals=5)
     return problem, solve(problem, starts=2, seed=0)
@@ -36,10 +30,9 @@ def point(solution: Solution) -> np.ndarray:
     return np.array(list(solution.x.values()))
 
 
-@pytest.mark.parametrize("phase", ["single_support", "double_support"])
-def test_prices_are_what_a_changed_limit_costs(phase: str, request: pytest.FixtureRequest) -> None:
+def test_prices_are_what_a_changed_limit_costs(double_support: tuple[GaitProblem, Solution]) -> None:
     """Each bound moved by a little, and the problem solved again from the optimum."""
-    problem, solution = request.getfixturevalue(phase)
+    problem, solution = double_support
     prices = {f"{bound.name} {bound.side}": bound for bound in solution.active_constraints}
     for key, parameter in (
         ("dbm_y_mean lower", "dbm_y_mean_limit_m"),
@@ -54,8 +47,8 @@ def test_prices_are_what_a_changed_limit_costs(phase: str, request: pytest.Fixtu
         assert (again.objective - solution.objective) / PRICE_STEP == pytest.approx(bound.price, rel=PRICE_TOLERANCE)
 
 
-def test_a_solution_accounts_for_its_work(single_support: tuple[GaitProblem, Solution]) -> None:
-    problem, solution = single_support
+def test_a_solution_accounts_for_its_work(double_support: tuple[GaitProblem, Solution]) -> None:
+    problem, solution = double_support
     counts = asdict(solution.evaluations)
     assert counts.keys() == {"f", "g", "gradient", "jacobian", "hessian"}
     assert all(count >= solution.best.iterations > 0 for count in counts.values())

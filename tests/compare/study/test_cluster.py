@@ -63,7 +63,6 @@ def search(evaluate, lower, upper, evaluations, seed):
 """
 
 
-@pytest.mark.commit
 @pytest.mark.filterwarnings("ignore")  # of Dask's own clean-up
 def test_workers_find_user_code_and_killed_processes_lose_no_run(
     cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

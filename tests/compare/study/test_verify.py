@@ -60,25 +60,35 @@ def test_a_share_says_how_likely_altered_runs_would_pass(sound: Path) -> None:
     assert compute_chance(106, 21) == pytest.approx(0.0982, abs=1e-4)  # 85/106 * 84/105 * ...: none of 10 is among 21
 
 
-ALTERATIONS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
-    "objective": (lambda r: r.update(objective=0.99), "its objective is 0.99, but that of its x is"),
-    "metric": (lambda r: r["metrics"].update({next(iter(r["metrics"])): 7.0}), "is 7, but that of its x is"),
-    "point": (lambda r: r["x"].update({next(iter(r["x"])): 0.1}), "but that of its x is"),
-    "history": (lambda r: r["history"]["objective"].__setitem__(-1, 0.9), "history: recorded"),
-    "count": (lambda r: r["counts"].update(f=99), "counts: recorded"),
-    "status": (lambda r: r.update(status="converged"), "status: recorded '\"converged\"'"),
-    "infeasible": (lambda r: r.update(feasible=False), "it is called infeasible"),
-    "version": (lambda r: r["versions"].update(casadi="3.0.0"), "computed by version 3.0.0"),
+Alteration = Callable[[dict[str, Any]], object]
+# Of a run by its solver and number.
+ALTERATIONS: dict[tuple[str, int], tuple[Alteration, str]] = {
+    ("pso", 0): (lambda r: r.update(objective=0.99), "its objective is 0.99, but that of its x is"),
+    ("pso", 1): (lambda r: r["metrics"].update({next(iter(r["metrics"])): 7.0}), "is 7, but that of its x is"),
+    ("pso", 2): (lambda r: r["x"].update({next(iter(r["x"])): 0.1}), "but that of its x is"),
+    ("ga", 0): (lambda r: r["history"]["objective"].__setitem__(-1, 0.9), "history: recorded"),
+    ("ga", 1): (lambda r: r["counts"].update(f=99), "counts: recorded"),
+    ("ga", 2): (lambda r: r.update(status="converged"), "status: recorded '\"converged\"'"),
+    ("ipopt", 0): (lambda r: r.update(feasible=False), "it is called infeasible"),
 }
 
 
-@pytest.mark.parametrize("what", ALTERATIONS)
-def test_an_edited_record_is_named(what: str, sound: Path, tmp_path: Path) -> None:
-    change, message = ALTERATIONS[what]
+def test_edited_records_are_named(sound: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(sound, tmp_path / "study")
-    edit(find(folder, "ga"), change)
+    for (solver, run), (change, _) in ALTERATIONS.items():
+        edit(find(folder, solver, run), change)
     verification = verify_study(folder)
-    assert message in describe(verification) and verification.holds == (what == "version")
+    assert not verification.holds
+    for (solver, run), (_, message) in ALTERATIONS.items():
+        named = f"walk12, {solver}, run {run}"
+        assert any(row[0].startswith(named) and message in " ".join(row) for row in verification.rows), named
+
+
+def test_a_run_of_another_version_is_named_and_holds(sound: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(sound, tmp_path / "study")
+    edit(find(folder, "ga"), lambda record: record["versions"].update(casadi="3.0.0"))
+    verification = verify_study(folder)
+    assert "computed by version 3.0.0" in describe(verification) and verification.holds
 
 
 def test_copied_points_missing_runs_and_damaged_records_are_named(sound: Path, tmp_path: Path) -> None:
