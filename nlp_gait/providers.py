@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 PROBLEMS = {
     "nao-ssp": "nlp_gait.gaits.nao.problems:nao_ssp",
     "nao-dsp": "nlp_gait.gaits.nao.problems:nao_dsp",
-    "nao-walk": "nlp_gait.gaits.nao.walking:nao_walk",
-    "nao-cycle": "nlp_gait.gaits.nao.walking:nao_cycle",
+    "nao-walk": "nlp_gait.gaits.nao.problems:nao_walk",
+    "nao-cycle": "nlp_gait.gaits.nao.problems:nao_cycle",
     "humanoid-ssp": "nlp_gait.gaits.humanoid.problems:humanoid_ssp",
     "humanoid-dsp": "nlp_gait.gaits.humanoid.problems:humanoid_dsp",
     "humanoid-cycle": "nlp_gait.gaits.humanoid.problems:humanoid_cycle",

@@ -36,6 +36,10 @@ RESTING_ARM_ANGLES = HELD_ARM_ANGLES | {
 
 # The axis about which each joint must turn.
 AXES = dict(zip(LEG_JOINTS, (FORWARD, TO_THE_LEFT, TO_THE_LEFT, TO_THE_LEFT, FORWARD), strict=True))
+CROSSING, BELOW = (
+    ("HipPitch", "AnkleRoll"),
+    ("KneePitch", "AnklePitch"),
+)  # the joint before each of these, or straight below it
 
 # Published axes and origins are rounded: 1e-3 rad and 0.1 mm move a foot by less than the 4 mm by which margins reproduce.
 AXIS_TOLERANCE, ORIGIN_TOLERANCE_M = 1e-3, 1e-4
@@ -52,45 +56,33 @@ class LegGeometry(NamedTuple):
 
 def measure_leg(robot: Robot, side: str) -> LegGeometry:
     """Measure the leg on side ``"L"`` or ``"R"``; raises InputError if the closed form does not solve it, or UnknownNameError."""
-    yaw = robot.joint(f"{side}HipYawPitch")
-    roll, pitch, knee, ankle, ankle_roll = (robot.joint(f"{side}{name}") for name in LEG_JOINTS)
-    _check_chain(robot, (yaw, roll, pitch, knee, ankle, ankle_roll))
-    for joint, name in zip((roll, pitch, knee, ankle, ankle_roll), LEG_JOINTS, strict=True):
-        if math.dist(joint.axis, AXES[name]) > AXIS_TOLERANCE:
-            raise InputError(
-                f"robot {robot.name!r}, joint {joint.name!r}: its axis must be {list(AXES[name])} (x forward, y left, z up, "
-                f"at zero angles), got {list(joint.axis)}"
-            )
-    for joint, above in ((pitch, roll), (ankle_roll, ankle)):
-        if math.hypot(*joint.origin_m) > ORIGIN_TOLERANCE_M:
-            raise InputError(
-                f"robot {robot.name!r}, joint {joint.name!r}: its axis must cross that of {above.name!r}, origin_m "
-                f"[0, 0, 0]; got {list(joint.origin_m)}. The closed-form legs have no offset there"
-            )
-    for joint in (knee, ankle):
-        x, y, z = joint.origin_m
-        if math.hypot(x, y) > ORIGIN_TOLERANCE_M or not z < 0.0:
-            raise InputError(
-                f"robot {robot.name!r}, joint {joint.name!r}: at zero angles it must be straight below the joint before it, "
-                f"origin_m [0, 0, -length]; got {list(joint.origin_m)}. The closed-form legs have no offset there"
-            )
-    name = "left" if side == "L" else "right"
-    foot = robot.feet[name]
-    if foot.link != ankle_roll.child:
-        raise InputError(
-            f"robot {robot.name!r}, foot {name!r}: its link must be {ankle_roll.child!r}, which joint "
-            f"{ankle_roll.name!r} carries, got {foot.link!r}"
-        )
-    hip = tuple(a + b for a, b in zip(yaw.origin_m, roll.origin_m, strict=True))
-    return LegGeometry(hip, -knee.origin_m[2], -ankle.origin_m[2], foot.ankle_height_m)  # type: ignore[arg-type]
-
-
-def _check_chain(robot: Robot, joints: tuple[Joint, ...]) -> None:
+    joints = {name: robot.joint(f"{side}{name}") for name in ("HipYawPitch", *LEG_JOINTS)}
     above = robot.root
-    for joint in joints:
-        if joint.parent != above:
+    for name, joint in joints.items():
+        if (wrong := _find_misfit(name, joint, above)) is not None:
             raise InputError(
-                f"robot {robot.name!r}, joint {joint.name!r}: its parent must be link {above!r}, got {joint.parent!r}; a leg is "
-                f"the chain {' - '.join(j.name for j in joints)} from the torso"
+                f"robot {robot.name!r}, joint {joint.name!r}: its {wrong}. The legs that are solved in closed form are chains "
+                f"{' - '.join(joints)} from the torso, whose hips and ankles have no offsets"
             )
         above = joint.child
+    name = "left" if side == "L" else "right"
+    foot = robot.feet[name]
+    if foot.link != above:
+        raise InputError(f"robot {robot.name!r}, foot {name!r}: its link must be {above!r}, got {foot.link!r}")
+    yaw, roll, _, knee, ankle, _ = (joint.origin_m for joint in joints.values())
+    hip = yaw[0] + roll[0], yaw[1] + roll[1], yaw[2] + roll[2]
+    return LegGeometry(hip, -knee[2], -ankle[2], foot.ankle_height_m)
+
+
+def _find_misfit(name: str, joint: Joint, above: str) -> str | None:
+    """Return what is wrong with a joint of a leg that is carried by link ``above``; None if nothing is."""
+    x, y, z = joint.origin_m
+    if joint.parent != above:
+        return f"parent must be link {above!r}, got {joint.parent!r}"
+    if name in AXES and math.dist(joint.axis, AXES[name]) > AXIS_TOLERANCE:
+        return f"axis must be {list(AXES[name])} (x forward, y left, z up, at zero angles), got {list(joint.axis)}"
+    if name in CROSSING and math.hypot(x, y, z) > ORIGIN_TOLERANCE_M:
+        return f"axis must cross that of the joint before it, origin_m [0, 0, 0]; got {[x, y, z]}"
+    if name in BELOW and (math.hypot(x, y) > ORIGIN_TOLERANCE_M or not z < 0.0):
+        return f"place must be straight below the joint before it, origin_m [0, 0, -length]; got {[x, y, z]}"
+    return None

@@ -1,4 +1,4 @@
-"""The published phases of NAO."""
+"""Problems of NAO: the published phases, its cycle and its whole walk."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -8,7 +8,8 @@ from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.gaits.biped.body import ZmpGravity, ZmpMasses
 from nlp_gait.gaits.biped.loads import Division
 from nlp_gait.gaits.biped.phase import Derivatives
-from nlp_gait.gaits.biped.problems import LoadOptions, MotorOptions, PhaseOptions, RobotOptions, make_support_problem
+from nlp_gait.gaits.biped.problems import LoadOptions, MotorOptions, PhaseOptions, make_support_problem
+from nlp_gait.gaits.biped.walking import CycleOptions, WalkOptions, plan_cycle, plan_walk
 from nlp_gait.gaits.nao.body import Arms, NaoBody, make_nao
 
 STEP_M = 0.06
@@ -35,8 +36,8 @@ class LeastPower:
 
 
 @dataclass(frozen=True, kw_only=True)
-class NaoOptions(RobotOptions):
-    """NAO, or a robot of its build.
+class NaoOptions(MotorOptions):
+    """NAO, or a robot of its build, perhaps with its real motors.
 
     Attributes:
         rotational_inertia: false takes every link as a point mass, in torques and ZMP
@@ -50,12 +51,7 @@ class NaoOptions(RobotOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class NaoMotorOptions(NaoOptions, MotorOptions):
-    """The robot, perhaps with its real motors."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class NaoReading(NaoMotorOptions):
+class NaoReading(NaoOptions):
     """The robot in a reading of the paper.
 
     Attributes:
@@ -128,6 +124,34 @@ def nao_dsp(robot: DoubleSupportReading, options: PaperPhase, loads: PaperLoads)
     body = robot.make_body()
     problem = make_support_problem(body, options, loads, options.derivatives)
     return _add_least_power(problem, body, vars(robot) | vars(options), loads.torso_share)
+
+
+@maker
+def nao_cycle(robot: NaoOptions, options: CycleOptions) -> GaitProblem:
+    """Walking cycle of NAO: one step, whose mirror image is the next one.
+
+    The published phases cannot be chained: single support ends with the hip 0.03 m ahead of the stance foot, double support
+    starts 0.01 m ahead of it, and arms and velocities differ too. Here the states at both switches, the times and the step
+    length are variables, and the cycle repeats after mirroring left to right.
+
+    By ``torso_share="lever"`` the load passes from foot to foot.
+
+    Source:
+        Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walking cycle by this package.
+    """
+    return plan_cycle(robot.make_body(), options)
+
+
+@maker
+def nao_walk(robot: NaoOptions, options: WalkOptions) -> GaitProblem:
+    """Whole walk of NAO from standing to standing: weight shift, half step, steps, half step, weight shift.
+
+    Angles of its footholds are 0: one motor turns both feet.
+
+    Source:
+        Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
+    """
+    return plan_walk(robot.make_body(), options)
 
 
 def _add_least_power(

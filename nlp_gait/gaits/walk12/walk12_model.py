@@ -48,8 +48,6 @@ class PointMassBiped:
     shank_m: float  # d2, knee to ankle
     hip_distance_m: float  # w, between the hips
     foot_com_height_m: float  # L, from the ankle up the shank to the foot's mass
-    waist_length_m: float  # Bx
-    waist_width_m: float  # By
     foot_back_m: float  # Fx1, from the ankle to the rear edge of the sole
     foot_front_m: float  # Fx2, from the ankle to the front edge
     foot_width_m: float  # Fy; the ankle is in the middle

@@ -25,9 +25,11 @@ JOINTS = tuple(f"theta_{i}" for i in range(1, 13))
 # Columns of a leg's joints in the order of ``LegMotion.joints``: ankle roll, ankle pitch, knee, hip pitch, hip roll.
 COLUMNS = {"left": [0, 1, 2, 4, 5], "right": [11, 10, 9, 7, 6]}
 YAW_COLUMN = {"left": 3, "right": 8}
+LEG_POINTS = ("hip", "knee", "ankle")
 COLUMNS_OF = {
     **{name: make_vector_columns("m", "xy") for name in ("zmp", "zmp_foot")},
-    **{name: make_vector_columns("m") for name in ("waist", "com", "left_ankle", "right_ankle")},
+    **{name: make_vector_columns("m") for name in ("waist", "com")},
+    **{f"{side}_{joint}": make_vector_columns("m") for side in ("left", "right") for joint in LEG_POINTS},
     "left_stance": Columns(unit="1"),
 }
 MIRRORED_ROLLS = np.array([-1.0, 1.0, 1.0, 1.0, -1.0])
@@ -51,8 +53,8 @@ def compute_steps(
     has an effect only where a leg is out of reach.
 
     Returns:
-        t [s]; q, qd, qdd (columns theta_1 to theta_12); zmp, waist (between the hips), com, left_ankle and right_ankle in the
-        world, whose origin is the first stance ankle [m]; zmp_foot, the ZMP relative to the stance ankle in the foot's
+        t [s]; q, qd, qdd (columns theta_1 to theta_12); zmp, waist (between the hips), com, hip, knee and ankle of both legs in
+        the world, whose origin is the first stance ankle [m]; zmp_foot, the ZMP relative to the stance ankle in the foot's
         axes [m]; left_stance, 1 where the left leg stands.
     """
     sample = _make_sample_function(robot, zmp).map(intervals + 1)
@@ -108,17 +110,11 @@ def _place_in_world(local: dict[str, Array], side: float, ankle: Array, heading:
     )
     zmp_foot = local["zmp"] * mirror[:2]
     on_ground = np.column_stack([zmp_foot, np.zeros(len(zmp_foot))])
-    swing = ankle + (local["swing_ankle"] * mirror) @ rotation.T
-    stance = np.tile(ankle, (len(zmp_foot), 1))
-    left, right = (stance, swing) if side > 0 else (swing, stance)
-    return {
-        "zmp": (ankle + on_ground @ rotation.T)[:, :2],
-        "zmp_foot": zmp_foot,
-        "waist": ankle + (local["waist"] * mirror) @ rotation.T,
-        "com": ankle + (local["com"] * mirror) @ rotation.T,
-        "left_ankle": left,
-        "right_ankle": right,
-    }
+    places = {"zmp": (ankle + on_ground @ rotation.T)[:, :2], "zmp_foot": zmp_foot}
+    names = {"waist": "waist", "com": "com"}
+    for leg, stands in (("left", side > 0), ("right", side < 0)):
+        names |= {f"{leg}_{joint}": f"{'stance' if stands else 'swing'}_{joint}" for joint in LEG_POINTS}
+    return places | {name: ankle + (local[own] * mirror) @ rotation.T for name, own in names.items()}
 
 
 @cache
@@ -128,13 +124,23 @@ def _make_sample_function(robot: walk12_model.PointMassBiped, reading: walk12_mo
     T, turn, margin, phase = (SX.sym(name) for name in ("T", "K", "margin", "phase"))
     stance, swing = walk12_model.compute_legs(x, phase, T, turn, margin, robot, Exact())
     m = walk12_model.list_masses(robot)
+    masses = walk12_model.compute_mass_motion(stance, swing, robot).position
     outputs = {
         **dict(zip(("stance_q", "stance_qd", "stance_qdd"), stance.joints, strict=True)),
         **dict(zip(("swing_q", "swing_qd", "swing_qdd"), swing.joints, strict=True)),
         "zmp": walk12_model.compute_zmp(stance, swing, robot, reading),
-        "com": walk12_model.compute_mass_motion(stance, swing, robot).position @ m / float(ca.sum1(m)),  # (eq. 12)
-        "waist": (stance.hip.position + swing.hip.position) / 2,
-        "swing_ankle": swing.ankle.position,
+        "com": masses @ m / float(ca.sum1(m)),  # (eq. 12)
+        "waist": masses[:, 3],
+        **dict(
+            zip(
+                ("stance_hip", "stance_knee", "stance_ankle"),
+                (masses[:, 2], masses[:, 1], stance.ankle[0]),
+                strict=True,
+            )
+        ),
+        **dict(
+            zip(("swing_hip", "swing_knee", "swing_ankle"), (masses[:, 4], masses[:, 5], swing.ankle[0]), strict=True)
+        ),
     }
     inputs = [x, T, turn, margin, phase]
     return ca.Function(
@@ -153,21 +159,9 @@ def make_skeleton(robot: PointMassBiped, signals: Signals, parameters: Mapping[s
         -robot.foot_back_m, robot.foot_front_m, -robot.foot_width_m / 2, robot.foot_width_m / 2
     )
     limbs, soles = [], []
-    for side, sign, stands in ((display.LEFT, 0.5, left_stands), (display.RIGHT, -0.5, ~left_stands)):
-        hip, ankle = waist + sign * robot.hip_distance_m * across, arrays[f"{side}_ankle"]
-        knee = _place_knee(hip, ankle, forward, robot.thigh_m, robot.shank_m)
+    for side, stands in ((display.LEFT, left_stands), (display.RIGHT, ~left_stands)):
+        hip, knee, ankle = (arrays[f"{side}_{joint}"] for joint in LEG_POINTS)
         limbs.append(display.Limb(side=side, points=np.stack([waist, hip, knee, ankle], axis=1)))
         corners = ankle[:, None, :] + outline[:, :1] * forward[:, None, :] + outline[:, 1:2] * across[:, None, :]
         soles.append(display.Sole(side=side, corners=corners, supports=stands))
     return display.make_flat_skeleton(signals, limbs, soles)
-
-
-def _place_knee(hip: Array, ankle: Array, forward: Array, thigh: float, shank: float) -> Array:
-    """Return the knee (T, 3), bent forward in the plane of the leg and the forward axis [m]; a leg out of reach is straight."""
-    leg = ankle - hip
-    length = np.linalg.norm(leg, axis=1, keepdims=True)
-    along = leg / length
-    down = (thigh**2 - shank**2 + length**2) / (2 * length)
-    ahead = forward - (forward * along).sum(axis=1, keepdims=True) * along
-    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
-    return np.asarray(hip + down * along + np.sqrt(np.maximum(thigh**2 - down**2, 0.0)) * ahead)

@@ -99,9 +99,9 @@ def changed(group: str, name: str, **values: object) -> Callable[[Record], None]
 
 
 MISFITS = [
-    (changed("joints", "RHipRoll", axis=[-1.0, 0.0, 0.0]), r"joint 'RHipRoll': its axis must be .*reversed"),
+    (changed("joints", "RHipRoll", axis=[-1.0, 0.0, 0.0]), r"joint 'RHipRoll': its axis must be .*got"),
     (changed("joints", "LKneePitch", origin_m=[0.01, 0.0, -0.1]), r"joint 'LKneePitch': .*straight below"),
-    (changed("joints", "LHipPitch", origin_m=[0.0, 0.0, -0.02]), r"joint 'LHipPitch': .* cross that of 'LHipRoll'"),
+    (changed("joints", "LHipPitch", origin_m=[0.0, 0.0, -0.02]), r"joint 'LHipPitch': .* cross that"),
     (changed("joints", "LAnkleRoll", origin_m=[0.0, 0.0, -0.02]), r"joint 'LAnkleRoll': .* cross that"),
     (changed("feet", "left", link="LAnklePitch"), r"foot 'left': its link must be 'l_ankle'"),
     (changed("joints", "LHipYawPitch", parent="LShoulder"), r"joint 'LHipYawPitch': its parent must be link 'torso'"),

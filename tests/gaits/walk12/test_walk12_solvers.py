@@ -1,9 +1,8 @@
-"""Solvers on the 12-joint walk: IPOPT's optimum from any start, the paper's GA near it."""
+"""Solvers on the 12-joint walk: IPOPT's optimum from any start."""
 
 import numpy as np
 import pytest
 
-import metaheuristics
 import nlp_gait
 from nlp_gait.backends.solve import solve
 from tests.gaits.walk12.walk12_oracle import TABLE_3
@@ -35,15 +34,3 @@ def test_largest_f1_of_the_model() -> None:
     for f1max in (PROBLEM.value("f1max"), 300.0):
         most_stable = solve(PROBLEM.with_values(**{"lambda": 1.0, "f1max": f1max}), starts=2, seed=1)
         assert most_stable.objective * f1max == pytest.approx(F1MAX, rel=1e-3)
-
-
-def test_the_papers_ga_on_the_compiled_objective() -> None:
-    objective = nlp_gait.compile_objective(PROBLEM)
-    if objective.backend != "compiled":
-        pytest.skip("no compiler")
-    for seed in range(5):
-        result = metaheuristics.minimize(
-            objective, metaheuristics.make_algorithm("ga-goswami"), evaluations=930, seed=seed
-        )
-        assert result.feasible
-        assert 0.9 < -result.objective < 0.9708 + OPTIMUM_TOLERANCE
