@@ -17,8 +17,7 @@ import numpy as np
 
 import compare.study
 from nlp_gait import gaitbench
-from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import describe_difference, identify_problem
+from nlp_gait.backends.exact import build_exact_model, describe_difference, identify_problem
 from nlp_gait.decoding import decode
 from nlp_gait.files import read_json, write_json
 from nlp_gait.formulation import GaitProblem, load

@@ -7,8 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import casadi as ca
 
-from nlp_gait.backends.kernel.compiler import find_compiler
-from nlp_gait.backends.kernel.library_cache import load_library
+from nlp_gait.backends.kernel.compiler import find_compiler, load_library
 
 FLAGS = ("-fvisibility=hidden", "-DGCC_HASCLASSVISIBILITY", "-fno-math-errno", "-ffp-contract=off", "-w")
 

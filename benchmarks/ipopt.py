@@ -15,7 +15,7 @@ import nlp_gait
 from benchmarks.casadi_code import FLAGS, compiled_functions
 from benchmarks.rows import Array, Row, ratio, scale_to_lanes, side_by_side
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, CompiledNlp
-from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE
+from nlp_gait.backends.kernel.compiler import FOLDER_VARIABLE
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solve import count_workers
 from nlp_gait.backends.solvers.ipopt import IpoptSettings

@@ -15,7 +15,7 @@ from compare.cli import options
 from compare.cli.command import OUTPUT_FILE, command, report_interrupts
 from compare.cli.printing import Output, Rows, fail, say, show_progress
 from compare.study.references import find_reference
-from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.exact import identify_problem
 from nlp_gait.backends.plan_walk import MARGINS as MARGINS_OF_SOLE
 from nlp_gait.backends.plan_walk import WalkPlan, WalkSettings
 from nlp_gait.backends.solvers import registry

@@ -18,8 +18,7 @@ from compare.study.study import RECORDS, Study, name_record, run_study
 from metaheuristics import minimize
 from metaheuristics.interface import Algorithm
 from metaheuristics.registry import make_algorithm
-from nlp_gait.backends.exact import ExactModel, build_exact_model
-from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.exact import ExactModel, build_exact_model, identify_problem
 from nlp_gait.backends.kernel.compiled import available_cores, compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result

@@ -14,7 +14,7 @@ from compare.questions.question import Answer, Question, Work
 from compare.report.document import make_text_table
 from compare.study.references import find_reference
 from compare.study.run import describe_problem
-from nlp_gait.backends.identity import hash_json, identify_problem, make_key
+from nlp_gait.backends.exact import hash_json, identify_problem, make_key
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError

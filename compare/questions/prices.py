@@ -22,7 +22,7 @@ from compare.drawing.figures import make_figure, use_style
 from compare.questions.perturbed_problem import get_quantity, is_mass, perturb_robot
 from compare.questions.question import Answer, Question, Work, make_record_table
 from compare.report.document import Figure, Part, make_text_table
-from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.exact import identify_problem
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, differentiate_by_models, differentiate_by_parameters
 from nlp_gait.backends.solve import Continuation, find_cheapest_feasible

@@ -14,7 +14,7 @@ from compare.report.document import Document, Table, Value, make_text_table
 from compare.report.writing import write_document
 from compare.study.memo import Memo
 from compare.study.references import find_reference
-from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.exact import identify_problem
 from nlp_gait.decoding import decode_value
 from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import GaitProblem

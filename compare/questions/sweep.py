@@ -17,8 +17,7 @@ from compare.questions.question import Answer, Question, Work, make_record_table
 from compare.report.document import Figure, make_text_table
 from compare.study.references import find_reference
 from compare.study.run import IPOPT, describe_problem
-from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.exact import build_exact_model, identify_problem
 from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem

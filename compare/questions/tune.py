@@ -13,8 +13,7 @@ from compare.questions.question import Answer, Question, Work, make_record_table
 from compare.questions.sweep import Axis
 from compare.report.document import Figure
 from metaheuristics import make_algorithm, minimize
-from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.exact import build_exact_model, identify_problem
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array

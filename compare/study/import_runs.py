@@ -13,8 +13,7 @@ from compare.study.record import History, RunRecord, Times, describe_evaluation,
 from compare.study.references import SAME_VALUE, find_reference
 from compare.study.run import LABEL, Inputs, ProblemSpec
 from compare.study.study import read_records, read_study_file
-from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
+from nlp_gait.backends.exact import build_exact_model, describe_difference, hash_json, identify_problem
 from nlp_gait.columns import CsvTable, read_table
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem

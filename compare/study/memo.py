@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from nlp_gait import __version__
-from nlp_gait.backends.identity import hash_json
+from nlp_gait.backends.exact import hash_json
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder, read_json, write_json
 from nlp_gait.interrupts import Progress, ignore_progress

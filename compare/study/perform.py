@@ -29,7 +29,7 @@ from metaheuristics import EarlyStop
 from metaheuristics.interface import FEASIBILITY
 from metaheuristics.minimize import minimize
 from metaheuristics.registry import make_handling
-from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.exact import identify_problem
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.backends.solve import make_solution
 from nlp_gait.errors import InputError

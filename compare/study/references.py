@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem, make_key
+from nlp_gait.backends.exact import describe_difference, hash_json, identify_problem, make_key
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Objective

@@ -17,7 +17,7 @@ from metaheuristics.preparation import check_budget
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, make_algorithm, make_handling
 from metaheuristics.user_algorithm import PlainFunction, to_algorithm
 from nlp_gait import __version__
-from nlp_gait.backends.identity import hash_formulas, hash_json, identify_problem, make_key
+from nlp_gait.backends.exact import hash_formulas, hash_json, identify_problem, make_key
 from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solver
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown

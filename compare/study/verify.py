@@ -13,8 +13,7 @@ from compare.study.record import RunRecord, group_by, list_versions
 from compare.study.references import SAME_VALUE
 from compare.study.run import Handling, ProblemSpec, Run, Stop
 from compare.study.study import FILE, RECORDS, Study, read_each, read_study_file, run_study
-from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
+from nlp_gait.backends.exact import build_exact_model, describe_difference, hash_json, identify_problem
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError

@@ -11,10 +11,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.exact import ExactModel, build_exact_model
-from nlp_gait.backends.identity import hash_json, identify_problem, make_key
+from nlp_gait.backends.exact import ExactModel, build_exact_model, hash_json, identify_problem, make_key
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
-from nlp_gait.backends.kernel.library_cache import find_cache_folder
+from nlp_gait.backends.kernel.compiler import find_cache_folder
 from nlp_gait.backends.solve import solve
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError, check_name

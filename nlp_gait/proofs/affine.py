@@ -20,8 +20,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes
-from nlp_gait.backends.kernel.library_cache import load_library
+from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, load_library, native_lanes
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.symbolic.tape import read_tape

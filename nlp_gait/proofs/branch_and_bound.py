@@ -18,8 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import hash_json, identify_problem, make_key
+from nlp_gait.backends.exact import build_exact_model, hash_json, identify_problem, make_key
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_bytes, replace_file
 from nlp_gait.formulation import Array, GaitProblem

@@ -7,7 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal
 
-from nlp_gait.backends.identity import describe_difference, identify_problem
+from nlp_gait.backends.exact import describe_difference, identify_problem
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors, read_json

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from nlp_gait.backends.identity import describe_difference, hash_formulas, hash_json, identify_problem, make_key
+from nlp_gait.backends.exact import describe_difference, hash_formulas, hash_json, identify_problem, make_key
 from nlp_gait.formulation import load
 from tests.backends.toys import corner, toy
 

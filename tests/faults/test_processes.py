@@ -14,7 +14,7 @@ import pytest
 import nlp_gait
 from compare.study.run import ProblemSpec, Run, Stop
 from compare.study.study import Study, read_records, run_study
-from nlp_gait.backends.kernel import library_cache
+from nlp_gait.backends.kernel.compiler import FOLDER_VARIABLE
 from tests.compare.cli import calls
 from tests.faults.processes import ROOT, fake_compiler, start, wait_for
 
@@ -51,7 +51,7 @@ def test_workers_and_compilers_end_with_what_started_them(name: str, started: st
         process = start(*line.split(), str(tmp_path / "results"))
     else:
         compiler = {"CXX": fake_compiler(tmp_path, "sleep 600 & wait")}
-        cache = {library_cache.FOLDER_VARIABLE: str(tmp_path / "cache")}
+        cache = {FOLDER_VARIABLE: str(tmp_path / "cache")}
         program = "import nlp_gait; nlp_gait.compile_objective(nlp_gait.load('walk12'))"
         call = [sys.executable, "-c", program]
         process = subprocess.Popen(call, cwd=ROOT, env={**os.environ, **compiler, **cache}, text=True)

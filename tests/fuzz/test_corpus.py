@@ -14,7 +14,7 @@ from compare.study.record import read_record
 from compare.study.study import FILE, read_study_file
 from metaheuristics import SearchError
 from nlp_gait import __version__
-from nlp_gait.backends.identity import hash_json
+from nlp_gait.backends.exact import hash_json
 from nlp_gait.errors import GaitError
 from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.files import replace_nan

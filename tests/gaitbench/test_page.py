@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nlp_gait import gaitbench
-from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE
+from nlp_gait.backends.kernel.compiler import FOLDER_VARIABLE
 from nlp_gait.gaitbench import instance as instances
 from nlp_gait.gaitbench.adapters import ADAPTERS
 from nlp_gait.gaitbench.facts import Facts

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import describe_difference, identify_problem
+from nlp_gait.backends.exact import build_exact_model, describe_difference, identify_problem
 from nlp_gait.errors import InputError
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs.bounds import make_bounds

@@ -18,7 +18,7 @@ from compare.report.document import Figure, Part
 from compare.study.references import find_reference
 from compare.study.run import describe_problem
 from metaheuristics.multi_objective import check_budgets, make_front_algorithm, minimize_many
-from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.exact import identify_problem
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError

@@ -17,8 +17,7 @@ from casadi import MX
 from nlp_gait.backends.derivatives.assembly import NlpPlan, make_nlp_plan
 from nlp_gait.backends.derivatives.plan import CODES, EXPRESSIONS, format_number, write_function
 from nlp_gait.backends.derivatives.structure import split_nlp
-from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes, read_native_source
-from nlp_gait.backends.kernel.library_cache import load_library
+from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, load_library, native_lanes, read_native_source
 from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import Array
 

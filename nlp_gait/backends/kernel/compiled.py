@@ -23,10 +23,10 @@ from nlp_gait.backends.kernel.compiler import (
     Compiler,
     find_compiler,
     lane_flags,
+    load_library,
     native_lanes,
     write_rows_source,
 )
-from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import CompilerError, InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.assembly import to_floats

@@ -7,7 +7,6 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.kernel import compiler as compiler_module
-from nlp_gait.backends.kernel import library_cache
 from nlp_gait.backends.kernel.compiler import find_compiler
 from nlp_gait.backends.solvers import ipopt
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
@@ -33,7 +32,7 @@ FAULTS = {
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setenv(compiler_module.FOLDER_VARIABLE, str(tmp_path / "cache"))
 
 
 @pytest.mark.parametrize("fault", FAULTS)

@@ -20,7 +20,7 @@ from compare.study.record import RunRecord
 from compare.study.references import Reference, find_reference
 from compare.study.run import ProblemSpec, Run, Stop
 from compare.study.study import Study, run_study
-from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.exact import identify_problem
 from nlp_gait.formulation import Constraint
 from nlp_gait.formulation.result import load_result
 from nlp_gait.proofs.branch_and_bound import certify

@@ -11,7 +11,7 @@ import nlp_gait
 from compare.questions.certainty import Certainty, StartEnd, bound_missed, cluster_ends
 from compare.questions.question import find
 from compare.study.references import find_reference
-from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.exact import identify_problem
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint
 from nlp_gait.proofs.branch_and_bound import certify

@@ -6,8 +6,7 @@ import pytest
 import nlp_gait
 from compare.study.references import Reference, describe_gap, find_reference, load_shipped
 from nlp_gait import gaitbench
-from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import describe_difference, identify_problem
+from nlp_gait.backends.exact import build_exact_model, describe_difference, identify_problem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs.certificate import find_certificate, load_certificates

@@ -11,9 +11,7 @@ import pytest
 from threadpoolctl import ThreadpoolController
 
 from nlp_gait.backends.kernel import compiler as compiler_module
-from nlp_gait.backends.kernel import library_cache
-from nlp_gait.backends.kernel.compiler import Compiler, find_compiler
-from nlp_gait.backends.kernel.library_cache import find_cache_folder, load_library
+from nlp_gait.backends.kernel.compiler import Compiler, find_cache_folder, find_compiler, load_library
 from nlp_gait.errors import CompilerError
 
 SOURCE = 'extern "C" int answer(void) { return 42; }\n'
@@ -25,12 +23,12 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     folder = tmp_path / "cache"
     private = tmp_path / "private"
     private.mkdir(mode=0o700)
-    monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(folder))
+    monkeypatch.setenv(compiler_module.FOLDER_VARIABLE, str(folder))
     monkeypatch.setattr(tempfile, "tempdir", str(private))
-    library_cache.make_private_folder.cache_clear()
-    library_cache.warn_once.cache_clear()
+    compiler_module.make_private_folder.cache_clear()
+    compiler_module.warn_once.cache_clear()
     yield folder
-    library_cache.make_private_folder.cache_clear()
+    compiler_module.make_private_folder.cache_clear()
 
 
 @pytest.fixture
@@ -39,7 +37,7 @@ def compiler() -> Compiler:
 
 
 def list_libraries(cache: Path) -> list[Path]:
-    return sorted(cache.glob(f"*{library_cache.SUFFIX}"))
+    return sorted(cache.glob(f"*{compiler_module.SUFFIX}"))
 
 
 def answer(compiler: Compiler) -> tuple[int, Path]:
@@ -81,8 +79,8 @@ def test_a_cache_that_cannot_be_made(cache: Path, compiler: Compiler, caplog: py
 def test_a_folder_whose_name_is_not_text_has_no_library_that_threadpoolctl_cannot_name(
     compiler: Compiler, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setenv(library_cache.FOLDER_VARIABLE, os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
-    library_cache.warn_once.cache_clear()
+    monkeypatch.setenv(compiler_module.FOLDER_VARIABLE, os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
+    compiler_module.warn_once.cache_clear()
     assert answer(compiler)[0] == 42
     assert len(caplog.messages) == 1 and "cannot be made" in caplog.messages[0]
     assert ThreadpoolController().lib_controllers
@@ -107,7 +105,7 @@ def test_a_full_or_read_only_cache_costs_one_line(
 
 def test_of_two_processes_at_once_one_builds(cache: Path) -> None:
     code = (
-        "from nlp_gait.backends.kernel.library_cache import load_library\n"
+        "from nlp_gait.backends.kernel.compiler import load_library\n"
         "from nlp_gait.backends.kernel.compiler import Compiler, find_compiler\n"
         "build = Compiler.build\n"
         "Compiler.build = lambda *given: (print('built'), build(*given))\n"
