@@ -3,7 +3,6 @@
 import json
 import shlex
 import sys
-import threading
 import time
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -24,9 +23,8 @@ MOST_NAMED = 3  # written files; of more, the first one is named
 LONGEST_CELL = 24  # characters of a word in a table that are not wrapped
 LONGEST_SENTENCE = 2000  # characters of an error message, in which a value can be a whole file
 LOG_PERIOD_S = 30.0  # between lines of progress in a log
-FIRST_S, REWRITE_S = 1.0, 0.2  # until a line of progress on a terminal, and between its changes
+REFRESHED_PER_S = 5.0  # line of progress on a terminal
 COLUMNS = 79  # of a line of progress, at most
-CLEAR = "\r\x1b[K"  # of the line of a terminal
 
 
 class Rows(NamedTuple):
@@ -70,18 +68,12 @@ def escape_controls(text: str) -> str:
 
 
 stderr = PlainConsole(stderr=True, highlight=False, markup=False)
-shown: list["ProgressLine | None"] = [None]  # the line of progress on the terminal
 stdout = PlainConsole(highlight=False, markup=False)  # 80 columns without a terminal
 
 
 def say(sentence: str) -> None:
-    """Print a sentence on stderr, in place of a line of progress, which is then written again."""
-    if shown[0] is None:
-        stderr.print(sentence, soft_wrap=True)
-        return
-    with shown[0].lock:
-        shown[0].clear()
-        stderr.print(sentence, soft_wrap=True)
+    """Print a sentence on stderr, above a line of progress."""
+    stderr.print(sentence, soft_wrap=True)
 
 
 def say_error(message: str) -> None:
@@ -147,16 +139,14 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
 
 
 class ProgressLine:
-    """A line on a terminal that is rewritten, from the first second on; in a log, a line every half minute."""
+    """A line on a terminal that is rewritten; in a log, a line every half minute."""
 
-    def __init__(self, description: str, total: int | None, on_terminal: bool) -> None:
+    def __init__(self, description: str, total: int | None, note: str) -> None:
         """Begin; ``total`` is None for work of unknown length."""
-        self.description, self.total, self.on_terminal = description, total, on_terminal
+        self.description, self.total, self.note = description, total, note
         self.done = self.fresh = 0
-        self.note = ""
         self.started = time.monotonic()
-        self.next_s = FIRST_S if on_terminal else LOG_PERIOD_S
-        self.lock, self.ended = threading.RLock(), threading.Event()
+        self.next_s = LOG_PERIOD_S
 
     def __call__(self, note: str, steps: int = 1) -> None:
         """Count a step and show its note; more steps than one were done by an earlier command."""
@@ -164,8 +154,9 @@ class ProgressLine:
             return
         self.done, self.note = self.done + steps, "; ".join(note.splitlines())
         self.fresh += steps == 1
-        if not self.on_terminal:
-            self.show()
+        if not stderr.is_terminal and time.monotonic() - self.started >= self.next_s:
+            self.next_s += LOG_PERIOD_S
+            say(self.describe())
 
     def describe(self) -> str:
         """Return for example ``runs 48 of 106, 31 s left, best gap 0.0046 % (nao-ssp, ACO)``."""
@@ -175,28 +166,9 @@ class ProgressLine:
             left = f"{format_duration(seconds / self.fresh * max(self.total - self.done, 0))} left"
         return escape_controls(", ".join(filter(None, (f"{self.description} {self.done:,}{of}", left, self.note))))
 
-    def show(self) -> None:
-        """Write the line if it is time for it."""
-        with self.lock:
-            if time.monotonic() - self.started < self.next_s or self.ended.is_set():
-                return
-            if not self.on_terminal:
-                self.next_s += LOG_PERIOD_S
-                say(self.describe())
-                return
-            stderr.file.write(CLEAR + self.describe()[: min(COLUMNS, stderr.width - 1)])
-            stderr.file.flush()
-
-    def clear(self) -> None:
-        """Remove the line, before something else is printed."""
-        if self.on_terminal:
-            stderr.file.write(CLEAR)
-            stderr.file.flush()
-
-    def keep_showing(self) -> None:
-        """Rewrite the line until the work ends."""
-        while not self.ended.wait(REWRITE_S):
-            self.show()
+    def render(self) -> Text:
+        """Return the line as the terminal shows it."""
+        return Text(self.describe()[:COLUMNS], no_wrap=True, overflow="crop")
 
 
 def format_duration(seconds: float) -> str:
@@ -212,17 +184,18 @@ def show_progress(description: str, total: int | None, first: str = "") -> Itera
 
     The yielded function takes a note, and steps other than 1 for what an earlier command did.
     """
-    line = ProgressLine(description, total, stderr.is_terminal)
-    line.note = first
-    before, shown[0] = shown[0], line
-    ticker = threading.Thread(target=line.keep_showing, daemon=True)
-    if line.on_terminal:
-        ticker.start()
-    try:
+    line = ProgressLine(description, total, first)
+    if not stderr.is_terminal:
         yield line
-    finally:
-        line.ended.set()
-        shown[0] = before
-        if line.on_terminal:
-            ticker.join()
-            line.clear()
+        return
+    from rich.live import Live
+
+    with Live(
+        get_renderable=line.render,
+        console=stderr,
+        transient=True,
+        refresh_per_second=REFRESHED_PER_S,
+        redirect_stdout=False,  # a fork must not wait for a lock of this display
+        redirect_stderr=False,
+    ):
+        yield line

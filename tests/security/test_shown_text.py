@@ -119,9 +119,7 @@ def test_tables_errors_and_progress_show_them_too(monkeypatch: pytest.MonkeyPatc
     assert all(shown in text for shown in (r"[red]title\x1b[31m", "a[/]", r"\x1b[2J", "[blue]"))
     assert "\x1b" not in text and "\x07" not in text and text.endswith("nlp-gait: no file 'a\\x1b[31m b'\n")
     monkeypatch.setattr(printing, "stderr", PlainConsole(file=bar, force_terminal=True, width=200))
-    monkeypatch.setattr(printing, "FIRST_S", 0.0)
     with printing.show_progress("[/] runs\x1b[2J", 2) as advance:
         advance("torque_change[LKneePitch, 3] [/]\x1b[2J")
-        advance.show()
     assert "[/] runs" in bar.getvalue() and "\x1b[2J" not in bar.getvalue()
     assert "torque_change[LKneePitch, 3]" in bar.getvalue()
