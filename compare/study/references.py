@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -45,16 +45,11 @@ class Reference:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shipped:
-    """A shipped value."""
+class Shipped(Reference):
+    """A shipped value; its certificate may be of another form of the problem, such as with fixed variables for constants."""
 
-    problem: Mapping[str, Any]  # as ``identify_problem`` describes it
-    objective: float  # in the problem's sense
-    x: tuple[float, ...]  # (n,) its point; its total violation is at most the judge's tolerance
-    found_by: str  # solvers and their number of runs, in words
-    bound: float | None = None  # of its shipped certificate: no feasible point has a better objective
-    # Name of the certificate, whose problem may be another form of this one, such as with fixed variables for constants
-    proven_as: str = ""
+    problem: Mapping[str, Any]  #: as ``identify_problem`` describes it
+    found_by: str  #: solvers and their number of runs, in words
 
 
 @cache
@@ -79,9 +74,9 @@ def find_reference(problem: Mapping[str, Any], folder: Path | None = None) -> Re
         listed = any(entry.problem["name"] == problem["name"] for entry in load_shipped().values())
         return Reference(source=f"{OWN}; none is shipped for {'these settings' if listed else 'this problem'}")
     objective, bound = shipped.objective, shipped.bound
-    evidence = f"best of {shipped.found_by}" if bound is None else f"proven to {describe_gap(bound, objective)}"
-    source = f"shipped, {evidence}"
-    return Reference(objective=objective, x=shipped.x, bound=bound, source=source, proven_as=shipped.proven_as)
+    if bound is None or objective is None:
+        return replace(shipped, source=f"shipped, best of {shipped.found_by}")
+    return replace(shipped, source=f"shipped, proven to {describe_gap(bound, objective)}")
 
 
 def _find_proven(problem: Mapping[str, Any], folder: Path) -> Reference | None:
