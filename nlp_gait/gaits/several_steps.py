@@ -10,7 +10,7 @@ from nlp_gait.errors import check_count
 from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import find_partners, mirror_sign
-from nlp_gait.symbolic.rotations import turn_quaternion
+from nlp_gait.symbolic.kinematics import turn_quaternion
 
 JOINT_ARRAYS = ("q", "qd", "qdd", "tau", "q_desired", "qd_desired")
 SIDES_SWAPPED = {

@@ -14,18 +14,17 @@ from casadi import DM, SX
 
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic.elimination import Factors, choose_pivots, factorise
-from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Nonsmooth, Root
-from nlp_gait.symbolic.rotations import (
+from nlp_gait.symbolic.kinematics import (
     TINY,
     UP,
-    Array,
     axis_rotation,
     build_rotation,
     find_rotation,
     invert_turn,
     rotate_vector,
 )
-from nlp_gait.symbolic.trajectories import Motion, map_motion, stack
+from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Nonsmooth, Root
+from nlp_gait.symbolic.trajectories import Array, Motion, map_motion, stack
 
 # Least absolute value of a pivot, with lengths in units of the leg's length: a knee bent by 0.14 rad has 0.07. The second one is
 # for the iterates of a solver, which may be poses that no gait has.

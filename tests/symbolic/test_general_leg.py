@@ -18,9 +18,8 @@ from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.robots.leg import Leg
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.general_leg import TorsoMotion, leg_motion, sample_flat_foot_poses
-from nlp_gait.symbolic.kinematics import forward_kinematics, leg_angles
+from nlp_gait.symbolic.kinematics import axis_rotation, forward_kinematics, leg_angles
 from nlp_gait.symbolic.nonsmooth import Exact
-from nlp_gait.symbolic.rotations import axis_rotation
 from nlp_gait.symbolic.trajectories import Motion
 from tests.robots.crooked import crooked
 

@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import make_tree
-from nlp_gait.symbolic.kinematics import relative_rotation
-from nlp_gait.symbolic.rotations import axis_rotation
+from nlp_gait.symbolic.kinematics import axis_rotation, relative_rotation
 
 # Products of sines and cosines.
 ROUNDING = 1e-12

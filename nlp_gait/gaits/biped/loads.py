@@ -10,7 +10,7 @@ from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots.tree import make_point_masses, make_tree
 from nlp_gait.symbolic.dynamics import Wrench, combine_zmps, ground_load, newton_euler, shift_down, zmp_of_wrench
-from nlp_gait.symbolic.rotations import UP, axis_rotation
+from nlp_gait.symbolic.kinematics import UP, axis_rotation
 from nlp_gait.symbolic.trajectories import Motion
 
 Division = Literal["printed", "lever"]

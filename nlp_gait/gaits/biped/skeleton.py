@@ -10,8 +10,7 @@ from nlp_gait.formulation import Array, Signals
 from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sole, make_flat_skeleton, make_rectangle
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import make_tree
-from nlp_gait.symbolic.kinematics import forward_kinematics
-from nlp_gait.symbolic.rotations import turn_about_vertical
+from nlp_gait.symbolic.kinematics import forward_kinematics, turn_about_vertical
 
 ON_GROUND = 1e-6  # [m]; a higher sole does not bear load
 SHORTEST_SHARE = 0.25  # of the height of the root at zero angles; shorter limbs are fingers and cameras

@@ -25,8 +25,8 @@ from nlp_gait.robots.inference import SIDES
 from nlp_gait.robots.leg import Leg
 from nlp_gait.robots.tree import mirror_sign
 from nlp_gait.symbolic import general_leg
+from nlp_gait.symbolic.kinematics import FORWARD, TO_THE_LEFT, UP, axis_rotation, turn_quaternion
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
-from nlp_gait.symbolic.rotations import FORWARD, TO_THE_LEFT, UP, axis_rotation, turn_quaternion
 from nlp_gait.symbolic.trajectories import Motion, constant_motion
 
 # Heights of the hip's middle above the ankles, as shares of a leg's length. The least is the paper's; the greatest is more than

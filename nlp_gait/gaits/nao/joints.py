@@ -6,7 +6,7 @@ from typing import NamedTuple
 from nlp_gait.errors import InputError
 from nlp_gait.robots import Joint, Robot
 from nlp_gait.robots.robot import Vector
-from nlp_gait.symbolic.rotations import FORWARD, TO_THE_LEFT
+from nlp_gait.symbolic.kinematics import FORWARD, TO_THE_LEFT
 
 LEG_JOINTS = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
 ARM_JOINTS = ("ShoulderPitch", "ShoulderRoll", "ElbowYaw", "ElbowRoll", "WristYaw")

@@ -20,9 +20,8 @@ from casadi import DM, SX
 
 from nlp_gait.decoding import decode
 from nlp_gait.symbolic.dynamics import zmp_of_point_masses
-from nlp_gait.symbolic.kinematics import knee_cosine, leg_angles
+from nlp_gait.symbolic.kinematics import axis_rotation, knee_cosine, leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.rotations import axis_rotation
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, map_motion, stack
 
 GRAVITY = 9.81  # [m/s^2]

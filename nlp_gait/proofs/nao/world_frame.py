@@ -13,8 +13,7 @@ import numpy as np
 from casadi import DM, SX
 
 from nlp_gait.robots.robot import Joint, Link
-from nlp_gait.symbolic.kinematics import knee_cosine
-from nlp_gait.symbolic.rotations import axis_rotation
+from nlp_gait.symbolic.kinematics import axis_rotation, knee_cosine
 from nlp_gait.symbolic.trajectories import Motion, map_motion
 
 
