@@ -231,12 +231,12 @@ def make_recorded_gait(
     step = float(foot[1, 0])
     x: tuple[float, ...] = (motion.duration_s,)
     if shown == "nao-cycle":
-        motions = {kind: motion.cut(*span).smooth(motion.noise_rad > 0.0) for kind, span in phases.items()}
+        motions = {kind: motion.cut(*span) for kind, span in phases.items()}
         build = partial(make_recorded_cycle_problem, motions, motion.repeats)
         x = (*(motion.duration_s for motion in motions.values()), step)
     else:
-        (kind,) = phases
-        build = partial(make_recorded_phase_problem, kind, motion.smooth(motion.noise_rad > 0.0))
+        ((kind, span),) = phases.items()
+        build = partial(make_recorded_phase_problem, kind, motion.cut(*span))
         step = float(foot[1, 0] - foot[0, 0]) / 2 if kind is Support.SINGLE else step
     problem = make_refinable(build, intervals, options)
     cosine = float(make_places_function(motion.body)(motion.q[0])[1])

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import casadi as ca
 import numpy as np
 from casadi import DM, SX
-from numpy.typing import NDArray
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
@@ -63,37 +62,35 @@ class RecordedMotion:
         return CubicSpline(self.t, self.q)
 
     def cut(self, start_s: float, end_s: float) -> RecordedMotion:
-        """Return the motion between two times, from the samples in between alone: accelerations may jump at its ends.
+        """Return the motion between two times, smoothed, from the samples in between alone: accelerations may jump at its ends.
 
-        Raises InputError for too few samples.
+        Noisy joints follow the smoothest quintic splines that leave no more than their noise. Raises InputError for too few
+        samples.
         """
         within = (self.t > start_s - SAME_TIME_S) & (self.t < end_s + SAME_TIME_S)
         count = np.count_nonzero(within)
         if count < LEAST_ROWS:
             raise InputError(f"the phase from {start_s:g} s to {end_s:g} s has {count} samples; it needs {LEAST_ROWS}")
-        rows = self.t[within]
+        rows, samples = self.t[within], self.q[within]
         inside = rows[(rows > start_s + SAME_TIME_S) & (rows < end_s - SAME_TIME_S)]
         times = np.array([start_s, *inside, end_s])
-        from scipy.interpolate import CubicSpline
+        from scipy.interpolate import BSpline, CubicSpline, splrep
 
-        q = CubicSpline(rows, self.q[within])(times)
+        q = CubicSpline(rows, samples)(times)
+        for k in np.flatnonzero(self.noise_rad):
+            squares = (count + math.sqrt(2.0 * count)) * self.noise_rad[k] ** 2  # FITPACK's manual: at most
+            q[:, k] = BSpline(*splrep(rows, samples[:, k], k=min(5, count - 1), s=squares, quiet=1))(times)
         return replace(self, t=times - start_s, q=q)
 
     @cached_property
     def noise_rad(self) -> Array:
-        """Standard deviation (J,) of noise and rounding of each joint, zero where it is small."""
+        """Standard deviation (J,) of noise and rounding of each joint, zero where it is small.
+
+        A few dozen samples of one joint say little: none is taken to be measured better than half of the noisy ones.
+        """
         noise = estimate_noise(self.q)
-        return np.where(noise > NOISE_RAD, noise, 0.0)
-
-    def smooth(self, noisy: NDArray[np.bool_]) -> RecordedMotion:
-        """Return the motion with the smoothest quintic splines of the noisy joints (J,) that leave no more than their noise."""
-        from scipy.interpolate import BSpline, splrep
-
-        q, noise = self.q.copy(), estimate_noise(self.q)
-        for k in np.flatnonzero(noisy):
-            squares = len(self.t) * noise[k] ** 2
-            q[:, k] = BSpline(*splrep(self.t, q[:, k], k=5, s=squares, quiet=1))(self.t)
-        return replace(self, q=q)
+        noisy = noise > NOISE_RAD
+        return np.where(noisy, np.maximum(noise, np.median(noise[noisy])), 0.0) if noisy.any() else np.zeros(len(noise))
 
     def right_foot(self, times: Array) -> Array:
         """Return the right sole under its ankle relative to the left one (T, 3): ahead, to the left, and above [m]."""
