@@ -110,12 +110,10 @@ BOX = {"x": (0, 1), "y": (0, 1)}
 @pytest.mark.parametrize(
     ("arguments", "named", "message"),
     [
-        ((X + Y,), {}, "x must be the bounds by variable"),
         ((X + Y,), {"x": {"x": (0, 1)}}, "give 'y' either bounds, x={'y': .* or a value, p={'y': value}"),
         ((X,), {"x": BOX}, "no expression contains 'y'; they contain x"),
         ((X + Y, [True]), {"x": BOX}, "constraint g1 must be a comparison of SX expressions, .*, got True"),
         ((X + Y, [SX(1) <= X / X * 0 + SX.sym("c")]), {"x": BOX, "p": {"c": 1}}, "constraint g1 contains no variable"),
-        (({"x": X},), {}, "needs at least x and f"),
         (({"x": X, "f": X},), {"lbx": [0, 1], "ubx": 1}, "lbx must be one number or 1, got 2"),
         ((opti_with_an_integer(),), {}, "is an integer variable; problems here are continuous: relax it"),
     ],

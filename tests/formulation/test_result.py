@@ -43,7 +43,6 @@ def test_a_solution_is_read_with_its_options_and_parameters(tmp_path):
     ("data", "words"),
     [
         ("{", "is not valid JSON"),
-        ("[]", "it must be an object, got []; `nlp-gait solve ... --out FILE` writes a valid one"),
         ({"x": X}, "problem is missing"),
         ({"problem": "nao-dps", "x": X}, "unknown problem 'nao-dps'; did you mean 'nao-dsp'"),
         (
@@ -52,10 +51,7 @@ def test_a_solution_is_read_with_its_options_and_parameters(tmp_path):
         ),
         ({"problem": "nao-dsp", "x": {**X, "hip_height_m": "tall"}}, "hip_height_m must be a number, got 'tall'"),
         ({"problem": "nao-dsp", "x": {**X, "hip_height_m": float("nan")}}, "hip_height_m' must be finite, got nan"),
-        ({"problem": "nao-dsp", "x": X, "options": {"robot": 5}}, "option robot must be a text, got 5"),
-        ({"problem": "nao-dsp", "x": X, "parameters": {"torque_change_limit_Nm": "1"}}, "must be a number, got '1'"),
         ({"problem": "nao-dsp", "x": X, "paramters": {}}, "unknown key 'paramters'; did you mean 'parameters'"),
-        ({"problem": "nao-dsp", "x": X, "schema": 2}, "schema must be 1, got 2"),
         ({"problem": "nao-dsp", "x": X, "robot": "nao-v4"}, "write it into 'options'"),
     ],
 )
@@ -65,11 +61,9 @@ def test_damaged_files_are_refused_by_name(tmp_path, data, words):
     assert words in str(caught.value)
 
 
-def test_keys_that_are_not_needed_are_ignored_and_misspelled_ones_are_not(tmp_path):
+def test_keys_that_are_not_needed_are_ignored(tmp_path):
     stated = {"problem": "nao-dsp", "options": {"robot": "nao-v6"}, "x": X, "status": "converged"}
     assert load_result(written(tmp_path, stated)).problem.options["robot"] == "nao-v6"
-    with pytest.raises(InputError, match="unknown key 'option'; did you mean 'options'"):
-        load_result(written(tmp_path, stated | {"option": {}}))
 
 
 @pytest.mark.parametrize(("period", "samples"), [(0.2, 11), (0.1, 21), (0.15, 21), (10.0, 11)])

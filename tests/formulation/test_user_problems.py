@@ -96,7 +96,6 @@ def test_a_result_file_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
             "import casadi as ca\ndef leg(): return ca.fmax(None, 'a')",
             "at line 2, .*CasADi does not take these arguments",
         ),
-        ("other = 1", "unknown name in .*own.py 'leg'; .*other"),
     ],
 )
 def test_messages_say_what_is_wrong_with_the_file(text: str, message: str, tmp_path: Path) -> None:
@@ -114,8 +113,6 @@ def test_messages_say_what_is_wrong_with_the_file(text: str, message: str, tmp_p
         ({"upper": "1"}, "'knee': upper must be a CasADi MX, got str '1'"),
         ({"value": None}, "'knee': value must be a CasADi MX, got NoneType"),
         ({"value": THREE}, "'knee': value has 3 rows and labels has 0; give one label per row"),
-        ({"value": THREE.T}, "'knee': value must be a column, got shape \\(1, 3\\)"),
-        ({"scale": 0.0}, "'knee': scale must be > 0"),
         ({"lower": None}, "'knee': lower, upper or both are required"),
         (
             {"value": THREE, "labels": ("a", "b", "c"), "lower": 0.5, "upper": MX([1.0, 0.0, 1.0])},
@@ -161,7 +158,7 @@ def test_both_spellings_of_a_sense_mean_the_same(spelling: Any) -> None:
         (lambda value: SolverHints(hessian=value), "hessian"),
     ],
 )
-@pytest.mark.parametrize("value", ["Minimise", "", 1, True])
+@pytest.mark.parametrize("value", ["Minimise", 1])
 def test_a_value_that_a_data_class_does_not_allow_is_refused_when_it_is_made(make: Any, name: str, value: Any) -> None:
     with pytest.raises(InputError, match=f"{name} must be one of .*, got {value!r}"):
         make(value)
@@ -189,10 +186,6 @@ def vars_of(problem: GaitProblem) -> dict[str, Any]:
         (
             lambda x, y, p, ops: (x, (two_rows(ca.vertcat(x, y), lower=MX([0.0, float("nan")])),)),
             "constraint 'knee': lower is NaN; give a number, or leave it out for no bound",
-        ),
-        (
-            lambda x, y, p, ops: (x, (two_rows(ca.vertcat(x, y), ("left", "a$")),)),
-            "printable text without '\\$', got 'a\\$'",
         ),
     ],
 )

@@ -7,7 +7,6 @@ import nlp_gait
 from nlp_gait.formulation import Result, sample_signals
 
 SSP = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)
-WALK = (0.13, 0.1135, 0.02, 0.0204)
 
 
 def drawn(name, x=None, frames_per_s=2.5, **options):
@@ -36,13 +35,6 @@ def test_the_support_polygon_is_the_hull_of_loaded_soles(nao):
     alone, both = nao.support(5), nao.support(0)
     assert sorted(map(tuple, alone.round(9))) == [(0.01, 0.01), (0.01, 0.09), (0.16, 0.01), (0.16, 0.09)]
     assert len(both) == 6 and both[:, 1].min() == pytest.approx(-0.09)
-
-
-def test_walk12_legs_reach_from_hip_to_ankle():
-    walk = drawn("walk12", WALK, 20.0)
-    lengths = np.linalg.norm(np.diff(np.stack([limb.points for limb in walk.limbs]), axis=2), axis=3)
-    np.testing.assert_allclose(lengths[..., 1:], np.broadcast_to(lengths[0, 0, 1:], lengths[..., 1:].shape), atol=1e-9)
-    assert walk.soles[0].supports[0] and not walk.soles[0].supports[-1]
 
 
 def test_the_drawn_stair_climber_is_where_its_planner_puts_it():

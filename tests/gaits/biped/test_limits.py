@@ -10,7 +10,7 @@ from casadi import DM, MX
 from nlp_gait.formulation import Grid
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import INSTEAD
-from nlp_gait.gaits.biped.limits import TorqueChange, compute_margins, make_rows
+from nlp_gait.gaits.biped.limits import TorqueChange, compute_margins
 from nlp_gait.gaits.biped.support_phases import make_support_box
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -43,11 +43,6 @@ def test_the_goal_torque_is_the_mean_sum_of_squared_torques() -> None:
     assert figure is not None
     squares = (TORQUE**2).sum(axis=0)  # trapezoid: half the weight at both ends
     assert numbers(figure(make_samples())) == pytest.approx([(squares.sum() - squares[[0, -1]].mean()) / 4])
-
-
-@pytest.mark.parametrize(("unit", "scale"), [("rad", 1.0), ("rad/s", 1.0), ("Nm", 1.0), ("m", 0.01), ("N", 10.0)])
-def test_violations_that_count_alike(unit: str, scale: float) -> None:
-    assert make_rows("row", unit, MX(0.0), MX(0.0), size=2.0).scale == 2.0 * scale
 
 
 def test_margins_are_distances_to_the_edges_of_a_sole_that_is_not_symmetric() -> None:

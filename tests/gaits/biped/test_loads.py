@@ -11,7 +11,6 @@ from casadi import DM, SX
 from nlp_gait.gaits.biped.loads import make_divided_loads, make_single_support_loads, share_torso
 from nlp_gait.gaits.biped.samples import Instant
 from nlp_gait.gaits.nao.body import make_nao
-from nlp_gait.symbolic.dynamics import Wrench, shift_down
 from nlp_gait.symbolic.trajectories import Motion
 
 BODY = replace(make_nao("nao-v5"), upright=frozenset())
@@ -32,28 +31,12 @@ def make_instant(rates: float, **more: Any) -> Instant:
     return Instant(joints=joints, hip=SX(DM(HIP)), ankles=ankles, **more)
 
 
-def test_a_wrench_is_shifted_to_a_point_below() -> None:
-    """Force (3, -5, 50) N and moment (7, 11, 13) Nm, 2 m higher: (0, 0, 2) x force = (10, 6, 0) is added."""
-    wrench = Wrench(SX(DM([3, -5, 50])), SX(DM([7, 11, 13])))
-    assert numbers(shift_down(wrench, 2.0)) == pytest.approx([3, -5, 50, 17, 17, 13])
-
-
 def test_the_centre_of_pressure_of_a_sole_is_the_zmp() -> None:
     now = make_single_support_loads(BODY)(make_instant(rates=3.0))
     _, _, load, roll, pitch, _ = numbers(now.wrenches["L"])
     assert load > 0.0 and abs(roll) > 0.1 and abs(pitch) > 0.1
     assert numbers(now.zmp) == pytest.approx(ANKLES["L"][:2] + (-pitch / load, roll / load), abs=1e-12)
     assert not numbers(now.wrenches["R"]).any()
-
-
-def test_the_zmp_of_two_feet_is_that_of_their_wrenches() -> None:
-    now = make_divided_loads(BODY, "lever")(make_instant(rates=1.0))
-    loads, places = {}, {}
-    for side, wrench in now.wrenches.items():
-        _, _, loads[side], roll, pitch, _ = numbers(wrench)
-        places[side] = ANKLES[side][:2] + (-pitch / loads[side], roll / loads[side])
-    combined = sum(loads[side] * places[side] for side in loads) / sum(loads.values())
-    assert numbers(now.zmp) == pytest.approx(combined, abs=1e-12)
 
 
 @pytest.mark.parametrize("rule", ["printed", "lever"])

@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import nlp_gait
-from nlp_gait.formulation.display import Sole
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.skeleton import make_level_sole
 from nlp_gait.robots import load_robot
@@ -21,16 +19,6 @@ def test_a_drawn_sole_reaches_as_far_to_each_side_as_the_foot(side: str) -> None
     ends = [foot.front_m, foot.back_m, foot.left_m, foot.right_m]
     x, y = sole.corners[0, :, 0], sole.corners[0, :, 1]
     assert [x.max(), -x.min(), y.max(), -y.min()] == pytest.approx(ends)
-
-
-def test_soles_of_the_12_joint_walk_are_as_wide_as_its_feet() -> None:
-    problem = nlp_gait.load("walk12")
-    skeleton = problem.display.skeleton
-    assert skeleton is not None
-    x = problem.start_point(np.random.default_rng(0))
-    soles: list[Sole] = skeleton(problem.signals(x), problem.parameter_values).soles
-    widths = [np.ptp(sole.corners[0, :, 1]) for sole in soles]
-    assert widths == pytest.approx([0.055, 0.055])  # Table I of the paper
 
 
 def test_a_sole_stands_in_the_middle_of_its_tread() -> None:

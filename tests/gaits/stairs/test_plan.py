@@ -2,21 +2,17 @@
 
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 import pytest
 import scipy.integrate
-from casadi import SX
 
 import nlp_gait
 from compare.judge import evaluate
 from compare.papers.stairs.printed import TABLE_3, TABLE_4
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.formulation import GaitProblem, Grid
-from nlp_gait.gaits.stairs.plan_samples import PlannedStep
-from nlp_gait.gaits.stairs.planar_biped import GRAVITY, load_toe_foot_biped, locate_centres, locate_points
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaits.stairs.planar_biped import load_toe_foot_biped
 from nlp_gait.gaits.stairs.stair import PAPER_TIMES
-from nlp_gait.symbolic.nonsmooth import Exact
 
 # Best of 20 starts, case 2 of Table IV.
 BEST_ENERGY_J = 110.880
@@ -91,31 +87,3 @@ def test_energy_is_the_integral_of_power_by_the_rule(rule: str) -> None:
     t, power = (np.split(values, 4) for values in (arrays["t"], np.abs(arrays["power"]).sum(axis=1)))
     energy = sum(integrate(p, x=instants) for p, instants in zip(power, t, strict=True))
     assert evaluate(problem, x).indexes["energy_J"] == pytest.approx(energy, rel=1e-12)
-
-
-def test_power_of_all_joints_is_the_change_of_mechanical_energy() -> None:
-    """With the load on both feet; ground forces act on points that stand still."""
-    parts = 200
-    planned = PlannedStep(phase_grid=Grid(intervals=parts), balance="polygon")
-    problem = nlp_gait.load("stairs-plan", balance="polygon")
-    samples = planned.samples(problem.at(NEAR_BEST[:-1]), Exact())
-    time, power, q = (np.array(ca.evalf(part)) for part in (samples.time, samples.power, samples.q))
-    foot = place = np.zeros((2, q.shape[1]))
-    angles, ankle = SX.sym("q", 9), SX.sym("ankle", 2)
-    middles = locate_centres(locate_points(angles, ankle))
-    centre = ca.Function("centres", [angles, ankle], [ca.vertcat(*middles.values())])
-    masses, spins = (
-        np.array([getattr(link, name) for link in load_toe_foot_biped().links]) for name in ("mass_kg", "inertia_kgm2")
-    )
-    checked = 0
-    for phase in range(4):
-        these = slice(phase * (parts + 1), (phase + 1) * (parts + 1))
-        t, q9 = time[0, these], np.vstack([q, foot])[:, these]
-        at = np.array(centre.map(parts + 1)(q9, place[:, these])).reshape(9, 2, -1)
-        speed, turn = np.gradient(at, t, axis=2), np.gradient(q9, t, axis=1)
-        energy = masses @ ((speed**2).sum(axis=1) / 2 + GRAVITY * at[:, 1]) + spins @ turn**2 / 2
-        change, inner = np.gradient(energy, t), slice(3, -3)
-        error = np.abs(change - power[:, these].sum(axis=0))[inner] / np.abs(power[:, these]).max()
-        assert error.max() < 3e-3
-        checked += len(error)
-    assert checked > 700
