@@ -89,8 +89,11 @@ def import_runs(
     records = []
     for k, (run, x) in enumerate(zip(runs, points, strict=True)):
         row = {name: math.nan if column is None else column[k] for name, column in given.items()}
-        x, note = _choose_point(problem, x, [table.texts[k][place] for place in order])
-        judged = describe_evaluation(evaluate(problem, x, prove=False))
+        note, judged = "", describe_evaluation(evaluate(problem, x, prove=False))
+        near = None if judged["feasible"] else find_feasible(problem, [table.texts[k][place] for place in order])
+        if near is not None:
+            note = "; judged at a feasible point that rounds to its printed digits"
+            x, judged = near, describe_evaluation(evaluate(problem, near, prove=False))
         for name, least in LEAST.items():
             table.number(name, k, row[name], least)
         course = courses.get(run, [])
@@ -127,12 +130,6 @@ def import_runs(
         )
         progress(k + 1, len(points))
     return records
-
-
-def _choose_point(problem: GaitProblem, x: Array, printed: Sequence[str]) -> tuple[Array, str]:
-    """Return a point, or if it is infeasible a feasible one that rounds to its printed digits, and a note on that."""
-    near = None if build_exact_model(problem).at(x, problem.p).feasible else find_feasible(problem, printed)
-    return (x, "") if near is None else (near, "; judged at a feasible point that rounds to its printed digits")
 
 
 def find_feasible(problem: GaitProblem, printed: Sequence[str]) -> Array | None:

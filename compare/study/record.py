@@ -107,16 +107,11 @@ class RunRecord:
         """Problem, solver and run, for messages."""
         return f"{self.problem}, {self.solver}, run {self.run}"
 
-    @property
-    def objective_text(self) -> str:
-        """The judge's objective, for example ``power 0.845869 W``."""
-        if not self.feasible:
-            return "infeasible"
-        objective = self.inputs.objective
-        return f"{objective.name} {self.objective:.6g} {objective.unit}".removesuffix(" 1")
-
     def __repr__(self) -> str:
-        return f"<RunRecord of {self.solver} on {self.problem}, run {self.run}: {self.objective_text}>"
+        objective, end = self.inputs.objective, "infeasible"
+        if self.feasible:
+            end = f"{objective.name} {self.objective:.6g} {objective.unit}".removesuffix(" 1")
+        return f"<RunRecord of {self.solver} on {self.problem}, run {self.run}: {end}>"
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data with a schema version; numbers that are not finite become null."""

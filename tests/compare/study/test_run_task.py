@@ -1,6 +1,5 @@
 """User-defined algorithms that fail in every way: each has a record of its failure, and the others' records are complete."""
 
-import json
 import re
 from pathlib import Path
 
@@ -8,7 +7,6 @@ import pytest
 
 from compare.study.run import ProblemSpec, Run, Stop, plan_runs
 from compare.study.study import Study, read_records, run_study
-from tests.compare.cli.calls import nlp_gait
 from tests.compare.records import run_once
 
 WALK = ProblemSpec(name="walk12")
@@ -129,14 +127,3 @@ def test_a_plain_function_is_stopped_at_its_budget_even_if_it_ignores_it(
     assert re.search(said, record.status)
     is_kept = said in ("evaluation budget used", "time limit reached")
     assert record.reported_feasible == is_kept and (said != "evaluation budget used" or record.counts["f"] == 200)
-
-
-def test_a_file_that_names_code_runs_nothing(tmp_path: Path) -> None:
-    mark, own, result = tmp_path / "it-ran", tmp_path / "never_named.py", tmp_path / "best.json"
-    own.write_text(f"from nlp_gait import load\nopen({str(mark)!r}, 'w').close()\nleg = load('walk12')\n")
-    x = dict.fromkeys(WALK.load().names, 0.1)
-    result.write_text(json.dumps({"problem": "other/never_named.py:leg", "x": x}))
-    refused = nlp_gait("export", result, "--to", "csv", status=1).stderr
-    assert "runs only if you name it: add --code other/never_named.py:leg" in refused and not mark.exists()
-    nlp_gait("export", result, "--to", "csv", "--code", f"{own}:leg")
-    assert mark.exists()
