@@ -11,7 +11,7 @@ from typing import NamedTuple
 from compare.study.pack import find_packed, list_problem_code, read_index
 from compare.study.record import RunRecord, group_by, list_versions
 from compare.study.references import SAME_VALUE
-from compare.study.run import Handling, ProblemSpec, Run, Stop
+from compare.study.run import Handling, ProblemSpec, Run, Stop, list_solvers
 from compare.study.study import FILE, RECORDS, Study, read_each, read_study_file, run_study
 from nlp_gait.backends.exact import build_exact_model, describe_difference, hash_json, identify_problem
 from nlp_gait.backends.kernel.compiled import available_cores
@@ -20,6 +20,7 @@ from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation.added_limits import split_names
 from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.formulation.result import StoredProblem
+from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import resolve_code
 
 # Fields in which a repeated run may differ from its record.
@@ -120,10 +121,15 @@ def _fold(rows: Sequence[Difference]) -> list[Difference]:
 
 
 def _list_missing(folder: Path, records: Sequence[RunRecord]) -> Iterator[Difference]:
-    """Yield planned runs without a record, and versions that are not this machine's."""
+    """Yield planned runs without a record, records under another's name, and versions that are not this machine's."""
     for name in read_study_file(folder).runs:
         if not (folder / RECORDS / f"{name}.json").exists():
             yield Difference(f"{RECORDS}/{name}.json", "missing", f"{FILE} lists it")
+    for record in records:
+        problem, solver = record.inputs.problem["name"], record.inputs.solver
+        for label, own, names in ((record.problem, problem, PROBLEMS), (record.solver, solver, list_solvers())):
+            if label in names and label != own:
+                yield Difference(record.name, "differs", f"{label!r} is the name of another one; this is of {own!r}")
     here = list_versions()
     for name in ("nlp-gait", "casadi"):
         others = {str(record.versions.get(name, here[name])) for record in records} - {here[name]}

@@ -6,6 +6,7 @@ import shutil
 import sys
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 
 from compare.study.pack import INDEX, pack_study, unpack_archive
 from compare.study.run import ProblemSpec, Stop, plan_runs
-from compare.study.study import Study, read_records, run_study
+from compare.study.study import Study, read_records, run_study, write_records
 from compare.study.verify import Verification, compute_chance, verify_study
 from nlp_gait.errors import InputError
 from tests.robots.custom import humanoid
@@ -101,6 +102,16 @@ def test_copied_points_missing_runs_and_damaged_records_are_named(sound: Path, t
     text = describe(verify_study(folder))
     assert "walk12, pso, run 0 differs" in text and "is not valid JSON" in text
     assert "walk12/ga-0001-" in text and "missing study.json lists it" in text
+
+
+def test_runs_under_the_label_of_another_solver_or_problem_are_named(sound: Path, tmp_path: Path) -> None:
+    record = next(record for record in read_records(sound)[0] if record.solver == "pso")
+    write_records(
+        [replace(record, solver="ga", run=k, problem=p) for k, p in enumerate(("walk12", "nao-ssp"))], tmp_path
+    )
+    text = describe(verify_study(tmp_path, share=0.0))
+    assert "'ga' is the name of another one; this is of 'pso'" in text
+    assert "'nao-ssp' is the name of another one; this is of 'walk12'" in text
 
 
 PROGRAM = """
