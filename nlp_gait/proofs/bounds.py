@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
 
 import numpy as np
 
@@ -67,17 +66,12 @@ def make_bounds(problem: GaitProblem) -> Bounds:
         InputError: an operation that cannot be enclosed, or a least-power form that differs from the exact functions.
         CompilerError: there is no compiler, or it fails.
     """
-    return _power_bounds(problem) if has_power_form(problem) else AffineBounds(problem)
+    return PowerBounds(problem) if has_power_form(problem) else AffineBounds(problem)
 
 
 def has_power_form(problem: GaitProblem) -> bool:
     """Return whether a problem has a least-power form; user code may have changed the problem, but not the form."""
     return isinstance(problem.least_power, LeastPower) and not problem.loaded_as
-
-
-@lru_cache(maxsize=1)  # takes a second to build
-def _power_bounds(problem: GaitProblem) -> PowerBounds:
-    return PowerBounds(problem)
 
 
 class AffineBounds(Bounds):
@@ -165,8 +159,7 @@ class PowerBounds(Bounds):
     """Bounds of the least power over boxes of z, from forms of degree two."""
 
     def __init__(self, problem: GaitProblem) -> None:
-        if not isinstance(problem.least_power, LeastPower):
-            raise InputError(f"problem {problem.name!r} with its options has no least-power form")
+        assert isinstance(problem.least_power, LeastPower)  # see ``has_power_form``
         form = make_power_form(problem, problem.least_power)
         _compare(problem, form)
         self._function, self._poses = QuadraticFunction(form.function), QuadraticFunction(form.poses)
@@ -177,8 +170,9 @@ class PowerBounds(Bounds):
         return self._form.to_z(x)
 
     def _prune(self, boxes: Array, target: float) -> Remaining:
-        rows, poses = self._form.rows, self._form.pose_rows
-        contracted, left = self._poses.contract(boxes, rows.lower[poses], rows.upper[poses])
+        rows = self._form.rows
+        _, lower, upper = rows.limits[self._form.pose_rows].T
+        contracted, left = self._poses.contract(boxes, lower, upper)
         remaining = self._function.prune(contracted[left], target + WIDENING * abs(target), rows)
         lowest = remaining.lowest - WIDENING * abs(target)  # of the judged problem
         return remaining._replace(lowest=lowest, origin=np.flatnonzero(left)[remaining.origin])

@@ -44,7 +44,6 @@ class Guarantee:
     sampled: tuple[str, ...] = ()  # rows that are defined on samples only; the judge checks them there
     # Bounds of true time means and integrals, by the name of the index
     means: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    pieces: int = 0  # number of pieces of time that were enclosed
     reason: str = ""  # why nothing is proven, or empty
 
     def __str__(self) -> str:
@@ -75,28 +74,26 @@ def guarantee(problem: GaitProblem, x: Array) -> Guarantee:
         return Guarantee(satisfied=None, reason=str(error))
     results = [_search_phase(problem, phase, np.asarray(x, dtype=float)) for phase in phases]
     means: dict[str, tuple[float, float]] = {}
-    for _, phase_means, _ in results:
+    for _, phase_means in results:
         for name, (low, high) in phase_means.items():
             before = means.get(name, (0.0, 0.0))
             means[name] = (before[0] + low, before[1] + high)
-    violations = tuple(sorted((v for rows, _, _ in results for v in rows), key=lambda v: v.from_s))
+    violations = tuple(sorted((v for rows, _ in results for v in rows), key=lambda v: v.from_s))
     proven = any(v.least > FEASIBILITY_TOLERANCE for v in violations)
     satisfied = False if proven else None if violations else True
     sampled = tuple(dict.fromkeys(name for phase in phases for name in phase.sampled))
-    count = sum(pieces for _, _, pieces in results)
-    return Guarantee(satisfied=satisfied, violations=violations, sampled=sampled, means=means, pieces=count)
+    return Guarantee(satisfied=satisfied, violations=violations, sampled=sampled, means=means)
 
 
 def _search_phase(
     problem: GaitProblem, phase: time_search.TimeFunctions, x: Array
-) -> tuple[list[RowViolation], dict[str, tuple[float, float]], int]:
-    """Return violations, bounds of means by name, and the number of pieces."""
+) -> tuple[list[RowViolation], dict[str, tuple[float, float]]]:
+    """Return violations, and bounds of means by name."""
     start, end = phase.source.times({**problem.by_name(x), **problem.parameter_values})
     step = round(1.0 / phase.source.intervals / GRAIN) * GRAIN
     given = np.concatenate([x, problem.p])
     violations: list[RowViolation] = []
     means: dict[str, tuple[float, float]] = {}
-    pieces = 0
     for rows, shift in ((phase.instants, None), (phase.changes, step)):
         if rows is None:
             continue
@@ -106,7 +103,6 @@ def _search_phase(
         limits = np.stack([lower[plain:], upper[plain:]], axis=-1)
         limits[[k - plain for k in phase.squares if shift is None]] **= 2
         search.sharpen_integrals(limits)
-        pieces += search.count
         for k, (a, b) in sorted(search.first.items()):
             piece = start + a * (end - start), start + b * (end - start)
             violations.append(_violation(rows, k, piece, float(search.least[k]), float(search.most[k])))
@@ -120,7 +116,7 @@ def _search_phase(
             most, least = (float(v) for v in time_search.bound_violation(lower[k], upper[k], low, high))
             if not most <= FEASIBILITY_TOLERANCE:
                 violations.append(_violation(rows, k, (start, end), least, most))
-    return violations, means, pieces
+    return violations, means
 
 
 def _violation(rows: TimeRows, k: int, piece: tuple[float, float], least: float, most: float) -> RowViolation:

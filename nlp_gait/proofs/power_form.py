@@ -18,20 +18,14 @@ AGREEMENT, WIDENING = 1e-11, 1e-8
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PowerRows:
-    """Roles of the outputs of a function: rows with bounds, and the terms of the cost.
+    """Roles of the outputs of a function, which are named by their numbers: rows with bounds, and the terms of the cost.
 
     The cost is the sum of weight |torque rate| over K terms, divided by the duration, plus the sum of loss times heat.
     """
 
-    row: Integers  # (R,) outputs that are limited
-    lower: Array  # (R,) their bounds
-    upper: Array  # (R,)
-    power: Integers  # (K,) outputs torque times rate
-    torque: Integers  # (K,) outputs
-    rate: Integers  # (K,) outputs, in unit time
-    weight: Array  # (K,) positive
-    heat: Integers  # (L,) outputs that are never negative
-    loss: Array  # (L,) positive
+    limits: Array  # (R, 3) outputs that are limited, lower and upper bounds
+    terms: Array  # (K, 4) outputs torque times rate, torque, and rate in unit time; positive weights
+    heats: Array  # (L, 2) outputs that are never negative; positive losses
     duration: int  # input
     ranges: Array  # (n,) widths of the inputs, in which boxes are measured
 

@@ -23,9 +23,6 @@ from nlp_gait.proofs.quadratic_tape import OUTPUT, make_tape
 
 QUADRATIC_SOURCES = ("quadratic.hpp", "convex.hpp", "multipliers.hpp", "relaxation.hpp", "quadratic_calls.hpp")
 MOST_SYMBOLS = 12
-# Arrays of ``PowerRows``, in the order of native/relaxation.hpp.
-INTEGERS = ("row", "power", "torque", "rate", "heat")
-NUMBERS = ("lower", "upper", "weight", "loss", "ranges")
 
 
 class _Tape(ctypes.Structure):
@@ -33,9 +30,12 @@ class _Tape(ctypes.Structure):
 
 
 class _PowerRows(ctypes.Structure):
+    """As in native/relaxation.hpp: integers, arrays of integers, and arrays of numbers."""
+
     _fields_ = [
         *((name, INT) for name in ("n", "outputs", "rows", "terms", "heats", "duration")),
-        *((name, POINTER) for name in (*INTEGERS, *NUMBERS)),
+        *((name, POINTER) for name in ("row", "power", "torque", "rate", "heat")),
+        *((name, POINTER) for name in ("lower", "upper", "weight", "loss", "ranges")),
     ]
 
 
@@ -100,17 +100,11 @@ class QuadraticFunction:
         """Remove from boxes (P, n, 2) all that has no feasible point below the target."""
         boxes = self._check(boxes).copy()
         left, lowest, cut = np.zeros(len(boxes), np.int32), np.zeros(len(boxes)), np.zeros(len(boxes), np.int32)
-        arrays = {name: np.ascontiguousarray(getattr(rows, name), np.int32) for name in INTEGERS}
-        arrays |= {name: np.ascontiguousarray(getattr(rows, name), np.float64) for name in NUMBERS}
-        structure = _PowerRows(
-            n=self.inputs,
-            outputs=self.outputs,
-            rows=len(rows.row),
-            terms=len(rows.power),
-            heats=len(rows.heat),
-            duration=rows.duration,
-            **{name: values.ctypes.data for name, values in arrays.items()},
-        )
+        (row, lower, upper), (power, torque, rate, weight), (heat, loss) = rows.limits.T, rows.terms.T, rows.heats.T
+        arrays = [np.ascontiguousarray(values, np.int32) for values in (row, power, torque, rate, heat)]
+        arrays += [np.ascontiguousarray(values, np.float64) for values in (lower, upper, weight, loss, rows.ranges)]
+        sizes = self.inputs, self.outputs, len(row), len(power), len(heat), rows.duration
+        structure = _PowerRows(*sizes, *(values.ctypes.data for values in arrays))
         self._run("prune", ctypes.byref(structure), target, len(boxes), boxes, left, lowest, cut)
         origin = np.flatnonzero(left)
         return Remaining(boxes[origin], lowest[origin], cut[origin].astype(np.intp), origin)

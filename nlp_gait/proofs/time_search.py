@@ -174,7 +174,6 @@ class TimeSearch:
     def __init__(self, rows: TimeRows, given: Array, shift: float | None, lower: Array, upper: Array) -> None:
         self._rows, self._given, self._shift = rows, given, shift
         self._lower, self._upper = lower, upper
-        self.count = 0  # of pieces that were enclosed
         self.least = np.full(len(lower), -np.inf)  # bounds of the largest violation of each row
         self.most = np.full(len(lower), -np.inf)
         # By the row's index: the earliest piece in which it is not proven to be satisfied.
@@ -248,7 +247,6 @@ class TimeSearch:
         return np.asarray(both * (pieces[:, 1] - pieces[:, 0])[:, None, None])
 
     def _enclose(self, function: AffineFunction, pieces: Array) -> AffineForms:
-        self.count += len(pieces)
         boxes = np.empty((len(pieces), function.inputs, 2))
         boxes[:, : len(self._given)] = self._given[:, None]
         boxes[:, len(self._given)] = pieces

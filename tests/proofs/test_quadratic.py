@@ -42,7 +42,7 @@ def power_form(name: str) -> PowerForm:
 def test_gaits_are_enclosed_at_sampled_points_of_boxes_around_the_best(name: str) -> None:
     form, rng = power_form(name), np.random.default_rng(SEED)
     function, z, (low, high) = QuadraticFunction(form.function), form.to_z(best_x(name)), form.box.T
-    pose_lower, pose_upper = (bound[form.pose_rows] for bound in (form.rows.lower, form.rows.upper))
+    _, pose_lower, pose_upper = form.rows.limits[form.pose_rows].T
     for width in (0.3, 0.03, 1e-4):
         half = width * (high - low) / 2
         box = np.stack([np.maximum(low, z - half), np.minimum(high, z + half)], -1)
@@ -90,17 +90,11 @@ def least_power(rng: np.random.Generator) -> tuple[ca.Function, PowerRows]:
     heats = [torque**2 for torque in torques[:2]]
     limited = quantity()
     outputs = ca.vertcat(*powers, *torques, *rates, *heats, limited)
-    first, second, third, fourth = (np.arange(4 * k, 4 * k + 4, dtype=np.int32) for k in range(4))
+    numbers, weights, losses = np.arange(4), 10.0 ** rng.uniform(-1.0, 0.0, 4), 10.0 ** rng.uniform(-1.0, 1.0, 2)
     rows = PowerRows(
-        row=np.array([14], dtype=np.int32),
-        lower=np.array([-2.0]),
-        upper=np.array([2.0]),
-        power=first,
-        torque=second,
-        rate=third,
-        weight=10.0 ** rng.uniform(-1.0, 0.0, 4),
-        heat=fourth[:2],
-        loss=10.0 ** rng.uniform(-1.0, 1.0, 2),
+        limits=np.array([[14, -2.0, 2.0]]),
+        terms=np.column_stack([numbers, 4 + numbers, 8 + numbers, weights]),
+        heats=np.column_stack([[12, 13], losses]),
         duration=3,
         ranges=np.ones(4),
     )
@@ -116,7 +110,7 @@ def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() ->
         corners = rng.choice([-1.0, 1.0], (100, 4))
         Z = centre + half * np.concatenate([corners, rng.uniform(-1.0, 1.0, (400, 4))])
         values = evaluate(function, Z)
-        cost = np.abs(values[:, rows.power]) @ rows.weight / Z[:, 3] + values[:, rows.heat] @ rows.loss
+        cost = np.abs(values[:, :4]) @ rows.terms[:, 3] / Z[:, 3] + values[:, 12:14] @ rows.heats[:, 1]
         feasible = np.abs(values[:, 14]) <= 2.0
         if not feasible.any():
             continue

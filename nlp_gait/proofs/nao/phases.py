@@ -84,24 +84,6 @@ class _Outputs:
         if pose:
             self.pose_rows.append(len(self.rows) - 1)
 
-    def power_rows(self, ranges: Array) -> PowerRows:
-        row, lower, upper = (np.array(column) for column in zip(*self.rows, strict=True))
-        power, torque, rate, weight = (np.array(column) for column in zip(*self.terms, strict=True))
-        heat, loss = (np.array(column) for column in zip(*self.heats, strict=True))
-        return PowerRows(
-            row=row,
-            lower=lower,
-            upper=upper,
-            power=power,
-            torque=torque,
-            rate=rate,
-            weight=weight,
-            heat=heat,
-            loss=loss,
-            duration=len(ranges) - 1,
-            ranges=np.where(ranges > 0.0, ranges, 1.0),  # a variable with equal bounds is never cut
-        )
-
 
 def _make_form(problem: GaitProblem, robot: Robot, phase: PowerPhase) -> PowerForm:
     z, values, out = SX.sym("z", len(problem.names)), problem.parameter_values, _Outputs()
@@ -139,12 +121,19 @@ def _make_form(problem: GaitProblem, robot: Robot, phase: PowerPhase) -> PowerFo
     indexes["torque_change_Nm"] = ca.mmax(ca.fabs(ca.vertcat(*changes)))
     indexes["power_W"] = power / z[-1] + sum((loss * out.expressions[heat] for heat, loss in out.heats), SX(0))
     box = _make_box_of_z(problem)
+    ranges = np.diff(box)[:, 0]
     poses = [out.expressions[out.rows[k][0]] for k in out.pose_rows]
     return PowerForm(
         to_z=to_z,
         box=box,
         function=ca.Function("power", [z], [ca.cse(ca.vertcat(*out.expressions))]),
-        rows=out.power_rows(np.diff(box)[:, 0]),
+        rows=PowerRows(
+            limits=np.array(out.rows),
+            terms=np.array(out.terms),
+            heats=np.array(out.heats),
+            duration=len(box) - 1,
+            ranges=np.where(ranges > 0.0, ranges, 1.0),  # a variable with equal bounds is never cut
+        ),
         poses=ca.Function("poses", [z], [ca.cse(ca.vertcat(*poses))]),
         pose_rows=np.array(out.pose_rows, dtype=np.int32),
         indexes=ca.Function("indexes", [z], list(indexes.values()), ["z"], list(indexes)),
