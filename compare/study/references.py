@@ -15,6 +15,7 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Objective
 from nlp_gait.gaitbench.facts import SIX_DIGITS
+from nlp_gait.gaitbench.generated import is_generated
 
 # Relative difference of an objective that is computed on another machine or by other compiled code.
 SAME_VALUE = 1e-9
@@ -103,10 +104,12 @@ def _find_proven(problem: Mapping[str, Any], folder: Path) -> Reference | None:
 
 def _find_generated(id: str, problem: Mapping[str, Any]) -> Reference | None:
     """Return the best known point of a generated instance, which may take some seconds if this machine has not found it yet."""
-    from nlp_gait.gaitbench.instance import load_generated
+    from nlp_gait import gaitbench
 
-    instance = load_generated(id)
-    if instance is None or describe_difference(problem, identify_problem(instance.gait_problem)):
+    if not is_generated(id):
+        return None
+    instance = gaitbench.load(id)
+    if describe_difference(problem, identify_problem(instance.gait_problem)):
         return None
     sign = instance.gait_problem.objective.sign
     source = f"generated with {instance.evidence}"

@@ -188,11 +188,6 @@ def load(id: str, *, unit_cube: bool = False) -> Instance:
     return _load(id, bool(unit_cube))
 
 
-def load_generated(id: str) -> Instance | None:
-    """Load a generated instance, whose best known point is computed and not shipped; None for another id."""
-    return load(id) if is_generated(id) else None
-
-
 def generate(family: str, seed: int, *, unit_cube: bool = False) -> Instance:
     """Draw an instance of GaitBench 2 from a family; the same seed gives the same one on every machine.
 

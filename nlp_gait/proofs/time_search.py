@@ -58,14 +58,6 @@ def bound_violation(lower: Array, upper: Array, low: Array, high: Array) -> tupl
     return most, least
 
 
-class EnclosedPart(NamedTuple):
-    """Group of values."""
-
-    function: AffineFunction  # computes them, and possibly others
-    columns: Numbers  # indices of the group in the function's results
-    work: float  # of an evaluation, relative to that of all values
-
-
 class TimeRows:
     """Enclosed functions of time of one kind: rows of every time, and other values whose time means are bounded."""
 
@@ -86,7 +78,7 @@ class TimeRows:
         for k, constraint in enumerate(constraints[: len(plain)]):
             groups[constraint].append(k)
         self.groups = [np.array(group) for group in groups.values()]  # indices of the rows with one name
-        self._parts: dict[int, EnclosedPart] = {}
+        self._parts: dict[int, tuple[AffineFunction, float]] = {}
 
     @lock_casadi
     def bound(self, p: Array) -> tuple[Array, Array]:
@@ -95,18 +87,14 @@ class TimeRows:
         return lower, upper
 
     @lock_casadi
-    def part(self, group: int) -> EnclosedPart:
-        """Return a group of rows: a function of its own if that takes less than half of all instructions."""
+    def part(self, group: int) -> tuple[AffineFunction, float]:
+        """Return the function of a group of rows, and its share of all instructions."""
         if group not in self._parts:
-            rows, arguments = self.groups[group], self._function.sx_in()
+            arguments = self._function.sx_in()
             (values,) = self._function.call(arguments)
-            function = ca.Function("part", arguments, [values[rows.tolist()]])
+            function = ca.Function("part", arguments, [values[self.groups[group].tolist()]])
             share = function.n_instructions() / self._function.n_instructions()
-            self._parts[group] = EnclosedPart(self.whole, rows, 1.0)
-            if share < 0.5:
-                self._parts[group] = EnclosedPart(
-                    AffineFunction(function, self._half_open), np.arange(len(rows)), share
-                )
+            self._parts[group] = AffineFunction(function, self._half_open), share
         return self._parts[group]
 
 
@@ -207,10 +195,10 @@ class TimeSearch:
                     self.first[row] = (a, b)
             if not again.any():
                 return
-            pieces, group = halve_pieces(pieces[again]), self._rows.part(number)
-            forms = self._enclose(group.function, pieces)
-            low, high = forms.lower[:, group.columns], forms.upper[:, group.columns]
-            work += group.work * len(pieces)
+            pieces, (function, share) = halve_pieces(pieces[again]), self._rows.part(number)
+            forms = self._enclose(function, pieces)
+            low, high = forms.lower, forms.upper
+            work += share * len(pieces)
 
     def integrals(self) -> tuple[Array, Array]:
         """Return bounds (k,) and (k,) of the integrals over the phase of the values that follow the rows."""

@@ -15,7 +15,6 @@ from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Over, Point,
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import affine
 from nlp_gait.proofs.guarantee import guarantee
-from nlp_gait.proofs.time_search import bound_violation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
 from tests.proofs.soundness import feasible_gaits, find_contradictions
@@ -61,21 +60,6 @@ def test_a_row_that_fails_between_samples_is_found_with_when_and_by_how_much() -
 def test_a_row_that_touches_its_limit_holds() -> None:
     found = guarantee(waving(PEAK), np.array([PEAK, 0.0]))
     assert found.satisfied and not found.violations and str(found) == "all limits are satisfied at all times"
-
-
-@pytest.mark.parametrize(
-    ("bounds", "values", "most", "least"),
-    [
-        ((0.0, math.inf), (-0.25, 0.5), 0.25, -0.5),
-        ((0.0, 1.0), (-0.5, -0.25), 0.5, 0.25),
-        ((0.0, math.inf), (-math.inf, 0.5), math.inf, -0.5),
-    ],
-)
-def test_values_are_outside_their_bounds_by_this_at_most_and_at_least(
-    bounds: tuple[float, float], values: tuple[float, float], most: float, least: float
-) -> None:
-    found = bound_violation(*(np.array([end]) for end in (*bounds, *values)))
-    assert [part.item() for part in found] == [most, least]
 
 
 def test_up_to_a_kink_only_the_formula_before_it_counts() -> None:

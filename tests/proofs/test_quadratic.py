@@ -6,14 +6,12 @@ import pytest
 from casadi import SX
 
 import nlp_gait
-from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.gaits.nao.problems import LeastPower
-from nlp_gait.proofs.bounds import make_bounds
 from nlp_gait.proofs.nao.phases import make_power_form
 from nlp_gait.proofs.power_form import PowerForm, PowerRows
 from nlp_gait.proofs.quadratic import QuadraticForms, QuadraticFunction
-from tests.proofs.soundness import best_x, load
+from tests.proofs.soundness import best_x
 
 SEED = 7
 POINTS = 200
@@ -123,15 +121,3 @@ def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() ->
                 assert ((found.boxes[0, :, 0] <= kept) & (kept <= found.boxes[0, :, 1])).all()
         tight += not len(found.origin) or found.lowest.item() > 0.7 * least
     assert tight > 6  # bounds that are far off would hide an error
-
-
-def test_boxes_that_contain_the_best_gait_keep_it_and_have_bounds_that_converge_to_its_cost() -> None:
-    problem, x = load("nao-ssp"), best_x("nao-ssp")
-    bounds, cost = make_bounds(problem), build_exact_model(problem).at(x, problem.p).cost
-    z, root = bounds.to_z(x), bounds.root[0]
-    half = np.diff(root)[:, 0] / 2 * 2.0 ** -np.arange(2.0, 12.0)[:, None]
-    boxes = np.stack([np.maximum(root[:, 0], z - half), np.minimum(root[:, 1], z + half)], -1)
-    found = bounds.prune(boxes, cost * (1 + 1e-6))
-    assert len(found.origin) == len(boxes)
-    assert np.all(np.diff(found.lowest[2:]) > 0.0) and cost * (1 - 1e-5) < found.lowest[-1] <= cost
-    assert np.all((found.boxes[..., 0] <= z) & (z <= found.boxes[..., 1]))

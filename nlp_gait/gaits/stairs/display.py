@@ -97,7 +97,7 @@ def _make_plate(link: str, length: float) -> Foot:
 
 def make_skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
     """Return the skeleton of the robot on its stair."""
-    history = signals.arrays.get("link_q", signals.arrays["q"])  # absolute angles of the moving links, or of all
+    history = signals.arrays["link_q"]  # absolute angles of the moving links, or of all
     samples = len(signals.arrays["t"])
     if history.shape[1] == len(biped.MOVING):
         history = np.hstack([history, np.zeros((samples, 2))])

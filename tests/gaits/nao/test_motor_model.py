@@ -156,9 +156,13 @@ def test_joints_that_share_a_motor() -> None:
     assert inertia["one each"] == 2 * inertia["one for two"] > 0.0
 
 
-def test_a_robot_without_motors_is_refused() -> None:
+def test_a_robot_without_motors_or_rotors_is_refused() -> None:
     knee = ROBOT.joint("LKneePitch")
     bare = replace(ROBOT, joints={**ROBOT.joints, "LKneePitch": replace(knee, motor=None)})
     assert parse_nao_motors("", bare).model is bare and parse_nao_motors("ankle", ROBOT).model is ROBOT
     with pytest.raises(InputError, match="'LKneePitch' has no motor data"):
         parse_nao_motors("limits", bare)
+    assert knee.motor is not None
+    rotorless = replace(knee, motor=replace(knee.motor, rotor_inertia_gcm2=None))
+    with pytest.raises(InputError, match="'LKneePitch' has no rotor_inertia_gcm2"):
+        parse_nao_motors("rotor", replace(ROBOT, joints={**ROBOT.joints, "LKneePitch": rotorless}))

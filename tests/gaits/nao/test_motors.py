@@ -1,16 +1,12 @@
 """Real motors in the NAO problems, against numbers by hand from the time histories."""
 
-import json
 import math
-from importlib import resources
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
 from nlp_gait import load
-from nlp_gait.errors import InputError
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 
@@ -70,28 +66,3 @@ def test_both_are_simulated_with_the_rotors_of_the_plan() -> None:
         assert heavy.robot.joint("LHipYawPitch").armature_kgm2 == pytest.approx(
             4.2e-7 * 201.3**2 / 2
         )  # one motor for two
-
-
-def test_a_robot_whose_rotors_are_unknown_is_refused(tmp_path: Path) -> None:
-    data = json.loads((resources.files("nlp_gait.robots") / "data" / "nao-v5.json").read_text())
-    del data["joints"]["LKneePitch"]["motor"]["rotor_inertia_gcm2"]
-    path = tmp_path / "unknown.json"
-    path.write_text(json.dumps(data))
-    load("nao-ssp", robot=str(path), motors="limits")
-    with pytest.raises(InputError, match="'LKneePitch' has no rotor_inertia_gcm2"):
-        load("nao-ssp", robot=str(path), motors="rotor")
-
-
-def test_a_cycle_pays_for_its_rotors_and_real_motors() -> None:
-    """Energy of the cycle from its time histories: with free braking and rotors, phase by phase."""
-    problem = load("nao-cycle", motors="rotor,free-braking", intervals=4)
-    x = (problem.lower + problem.upper) / 2
-    x[problem.names.index("single_support_time_s")] = 0.4  # accelerations large enough for rotors to matter
-    signals = problem.signals(x)
-    torque, rate, t = (signals.arrays[name] for name in ("tau", "qd", "t"))
-    power = (np.maximum(torque * rate, 0.0) + 0.025 * torque**2).sum(axis=1)
-    single = evaluated(problem, x).indexes["ssp_power_W"]
-    assert single == pytest.approx(float(mean(power[:5])), rel=1e-9)
-    assert t[4] == pytest.approx(0.4)
-    light = evaluated(load("nao-cycle", motors="free-braking", intervals=4), x).indexes["ssp_power_W"]
-    assert abs(single / light - 1.0) > 0.01
