@@ -1,6 +1,6 @@
 """Bhardwaj, Mishra, Sukavanam, Balasubramanian: a planned step on stairs, and its tracking by gains that an ant colony tunes.
 
-Plans are IPOPT's, of least jerk as the paper's and of least energy. The tracked step is read in five ways: nearest the print the
+Plans are IPOPT's, of least jerk as the paper's and of least energy. The tracked step is read in six ways: nearest the print the
 hip is the base, so that something else carries the robot.
 """
 
