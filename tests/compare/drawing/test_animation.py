@@ -31,12 +31,6 @@ def test_nao_has_its_lengths_and_stands_on_its_soles(nao):
     assert [sole.supports.tolist() for sole in nao.soles] == [[True] * 11, [True] + [False] * 9 + [True]]
 
 
-def test_the_support_polygon_is_the_hull_of_loaded_soles(nao):
-    alone, both = nao.support(5), nao.support(0)
-    assert sorted(map(tuple, alone.round(9))) == [(0.01, 0.01), (0.01, 0.09), (0.16, 0.01), (0.16, 0.09)]
-    assert len(both) == 6 and both[:, 1].min() == pytest.approx(-0.09)
-
-
 def test_the_drawn_stair_climber_is_where_its_planner_puts_it():
     problem = nlp_gait.load("stairs-plan")
     x = problem.start_point(np.random.default_rng(0))
@@ -50,7 +44,7 @@ def test_the_drawn_stair_climber_is_where_its_planner_puts_it():
 
 def test_stairs_are_drawn_under_the_feet():
     stairs = drawn("stairs-plan")
-    assert stairs.planar and stairs.support(0) is None
+    assert stairs.planar
     rises = np.unique(stairs.ground[:, 1])
     assert len(rises) == 3 and rises[1] == 0.0 and rises[2] == pytest.approx(-rises[0])
     stance = next(limb for limb in stairs.limbs if limb.side == "left").points
