@@ -86,7 +86,6 @@ def test_the_objective_cannot_write_into_its_points() -> None:
     ("lower", "upper", "message"),
     [
         ([0.0, 1.0], [1.0, 0.0], r"'x1'.*lower <= upper.*1\.0 and 0\.0"),
-        ([0.0, np.nan], [1.0, 1.0], "'x1'.*finite"),
         ([0.0, 0.0], [1.0], r"shape.*\(2,\).*\(1,\)"),
     ],
 )
@@ -101,9 +100,7 @@ def test_bad_bounds(lower: list[float], upper: list[float], message: str) -> Non
         ({"evaluations": 9}, "population of 'pso', 10, got 9: raise"),
         ({"seed": -1}, "seed must be a whole number >= 0"),
         ({"initial": np.zeros(2)}, r"initial: .* shape \(P, 2\).*got shape \(2,\)"),
-        ({"initial": np.zeros((11, 2))}, "initial: at most 10 points"),
         ({"initial": np.full((1, 2), 9.0)}, r"initial: 9\.0 for variable 0 of point 0, outside the bounds"),
-        ({"initial": np.ma.masked_array(np.zeros((1, 2)), mask=[[True, False]])}, "initial: .* other than numbers"),
     ],
 )
 def test_bad_arguments(arguments: dict[str, object], message: str) -> None:
@@ -122,9 +119,7 @@ def test_bad_criteria(criterion: dict[str, float]) -> None:
     [
         (np.zeros(10), "returned ndarray: return a tuple"),
         ((np.zeros((10, 1)), np.zeros(10)), r"got shapes \(10, 1\) and \(10,\)"),
-        ((np.zeros(10), 0.0), r"\(\)"),
         ((np.zeros(10), ["0.0"] * 10), "real numbers"),
-        ((np.ma.masked_array(np.zeros(10), mask=np.arange(10) == 3), np.zeros(10)), "real numbers"),
         ((np.zeros(10), np.full(10, -1e-9)), "violation must be >= 0.*row 0 has -1e-09"),
     ],
 )

@@ -51,11 +51,3 @@ def test_without_a_feasible_point_the_front_is_empty() -> None:
 def test_budgets_that_cannot_be_are_refused(budgets: tuple[int, ...]) -> None:
     with pytest.raises(SearchError, match="evaluations must rise"):
         minimize_many(TwoParabolas(), make_front_algorithm("NSGA2", population=20), evaluations=budgets)
-
-
-def test_nothing_to_vary_is_refused() -> None:
-    class Fixed(TwoParabolas):
-        upper = TwoParabolas.lower
-
-    with pytest.raises(SearchError, match="all variables are fixed"):
-        minimize_many(Fixed(), make_front_algorithm("CMOPSO", population=20), evaluations=(100,))
