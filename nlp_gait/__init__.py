@@ -56,7 +56,7 @@ def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
     """
     from nlp_gait.formulation.registry import load as load_problem
 
-    if name not in PROBLEMS and isinstance(name, str):
+    if isinstance(name, str) and name not in PROBLEMS:
         from nlp_gait.gaitbench.generated import resolve_name
 
         name, instance = resolve_name(name)
