@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from nlp_gait.backends.exact import build_exact_model, find_violated_rows
+from nlp_gait.errors import InputError
 from nlp_gait.files import read_json
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
@@ -90,7 +91,10 @@ def evaluate(
 
 
 def find_faults(result: Result, path: Path) -> list[str]:
-    """Return in words what is wrong with a gait from a file: rows and bounds that it violates, an objective that it has not."""
+    """Return in words what is wrong with a gait from a file: rows and bounds that it violates, an objective that it has not.
+
+    Raises InputError if its objective is not a finite number.
+    """
     problem, stated = result.problem, read_json(path, "result").get("objective")
     model = build_exact_model(problem)
     values, scales = model.at(result.x, problem.p), dict(zip(model.row_names, model.row_scales.tolist(), strict=True))
@@ -104,6 +108,10 @@ def find_faults(result: Result, path: Path) -> list[str]:
     more = f"; and {len(rows) - SHOWN} more" if len(rows) > SHOWN else ""
     sentences = [f"The gait is not feasible; violated: {'; '.join(worst)}{more}"] if rows else []
     value = problem.objective.sign * values.cost
+    if not math.isfinite(value):
+        raise InputError(
+            f"result {str(path)!r}: {problem.objective.name} is {value} at this x; {'; '.join(worst)}{more}"
+        )
     if isinstance(stated, int | float) and not abs(stated - value) <= SLIGHT * abs(value):
         unit = problem.objective.unit
         sentences.append(f"The file says {problem.objective.name} {stated:.6g} {unit}, and it is {value:.6g} {unit}")

@@ -99,10 +99,13 @@ def list_design(comparison: Comparison, problem: GaitProblem | None) -> tuple[Pa
     return (make_text_table(("best design", name_solver(best.solver)), rows),)
 
 
-def make_figure(comparison: Comparison, name: str) -> Figure:
-    """Return one of ``FIGURES``."""
+def make_figure(comparison: Comparison, name: str) -> Part:
+    """Return one of ``FIGURES``, or a sentence where no run has costs to draw."""
     compute, caption = FIGURES[name]
-    return make_chart_figure(f"{make_file_name(comparison.problem)}-{name}", caption, compute(comparison))
+    charts = compute(comparison)
+    if not charts:
+        return "The evaluations and times of all runs are unknown."
+    return make_chart_figure(f"{make_file_name(comparison.problem)}-{name}", caption, charts)
 
 
 def make_chart_figure(name: str, caption: str, charts: Sequence[Chart]) -> Figure:

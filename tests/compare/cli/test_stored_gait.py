@@ -36,6 +36,11 @@ def test_violations_and_false_objectives_are_named(
     assert faults == [] if words is None else words in faults[0]
 
 
+def test_a_gait_without_an_objective_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "gait.json", hip_height_m=1e308)
+    assert "power is nan at this x; bounds[hip_height_m] = 1e+308 m" in one_sentence("export", path, "--to", "csv")
+
+
 def test_a_time_that_runs_backwards_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "gait.json", single_support_time_s=-0.1)
     assert "must last 0.001 to 300 s, but it lasts -0.1 s" in one_sentence("export", path, "--to", "csv")

@@ -84,6 +84,13 @@ def test_a_damaged_file_is_refused_by_its_line(text: str, message: str, tmp_path
         read_points(tmp_path / "x.csv", PROBLEM)
 
 
+def test_a_study_of_points_alone_has_a_report(tmp_path: Path) -> None:
+    """There is no convergence to draw."""
+    out = tmp_path / "study"
+    nlp_gait("import", "walk12", finals(tmp_path), "--as", "thesis", "--out", out)
+    assert "evaluations and times of all runs are unknown" in (out / "report.html").read_text()
+
+
 def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_path: Path) -> None:
     out = tmp_path / "study"
     extra: dict[str, list[object]] = {"evaluations": [100, "", ""], "time_s": ["", 2.0, ""]}
