@@ -47,6 +47,7 @@ Start = Callable[[Mapping[str, float], np.random.Generator], Array]
 # A point is on a bound if it misses it by at most this share of the variable's default range.
 ROUNDING = 1e-6
 LONGEST_LINE = 98  # of a problem that is printed, without its brackets
+MOST_ROWS = 40  # of a table
 LIMITS_OPTION = "limits"  # of makers whose problems have phases
 
 
@@ -116,6 +117,20 @@ class GaitProblem:
         goal, n = self.objective, len(self.variables)
         text = f"{self.address}: {goal.sense} {goal.name} [{goal.unit}] over {n} variables, {len(self.own_parameters)} parameters"
         return f"<{text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 3] + '...'}>"
+
+    def describe(self) -> str:
+        """Return tables of the variables, parameters and options, as text; ``print(problem.describe())``."""
+        variables = [(v.name, f"{low:g}", f"{high:g}", v.unit, v.description) for v, low, high in
+                     zip(self.variables, self.lower.tolist(), self.upper.tolist(), strict=True)]  # fmt: skip
+        parameters = [(q.name, f"{self.value(q.name):g}", q.unit, q.description) for q in self.own_parameters]
+        blocks = [f"{self.address}: {self.title}", repr(self)[1:-1].partition(": ")[2]]
+        for header, rows in (
+            (("variable", "lower", "upper", "unit", ""), variables),
+            (("parameter", "value", "unit", ""), parameters),
+            (("option", "value"), [(name, str(value)) for name, value in self.options.items()]),
+        ):
+            blocks += [_format_table(header, rows)] if rows else []
+        return "\n\n".join(blocks)
 
     @property
     def moves(self) -> bool:
@@ -440,3 +455,12 @@ def _frozen(values: Sequence[float]) -> Array:
     array = np.array(values, dtype=float)
     array.setflags(write=False)
     return array
+
+
+def _format_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return aligned columns of the first rows."""
+    lines = [header, *rows[:MOST_ROWS]]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(header))]
+    text = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
+    more = [f"and {len(rows) - MOST_ROWS:,} more"] if len(rows) > MOST_ROWS else []
+    return "\n".join([*text, *more])

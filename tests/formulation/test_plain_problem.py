@@ -84,14 +84,20 @@ def test_equations_may_be_missed_by_a_tolerance() -> None:
 def test_the_welded_beam_is_loaded_by_name_and_speaks_of_no_gait() -> None:
     beam = nlp_gait.load(BEAM)
     assert (beam.name, beam.moves) == ("beam", False)
+    text = beam.describe()
+    assert "USD" in text and not [word for word in ("gait", "phase", "sample") if word in text]
     assert nlp_gait.solve(beam, starts=3).objective == pytest.approx(BEST, rel=1e-7)
 
 
-def test_a_problem_prints_as_one_line() -> None:
+def test_a_problem_prints_as_one_line_and_describes_itself_as_a_table() -> None:
     for name in ("nao-ssp", "stairs-climb"):
         problem = nlp_gait.load(name)
         assert "\n" not in str(problem) and len(str(problem)) <= 100
     assert str(problem) == "<stairs-climb: minimise effort [1] over 3354 variables, 10 parameters>"
+    lines = problem.describe().splitlines()
+    assert len(lines) < 80 and "and 3,314 more" in lines
+    described = nlp_gait.load("nao-ssp").fix(hip_height_m=0.3).describe()
+    assert "hip_height_m" in described and "0.3" in described and "heat_loss_W_per_Nm2" in described
 
 
 def opti_with_an_integer() -> Any:
