@@ -145,5 +145,5 @@ def _drop_unnamed_columns(rows: list[tuple[int, list[str]]], has_header: bool) -
 
 
 def _is_number(cell: str) -> bool:
-    """Return whether a cell is a number with a decimal point or comma."""
-    return is_numeric_text(cell.replace(",", ".", 1))
+    """Return whether a cell is a number with a decimal point or comma; Python alone reads 0.3_1, and digits of other scripts."""
+    return cell.isascii() and "_" not in cell and is_numeric_text(cell.replace(",", ".", 1))

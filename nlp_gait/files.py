@@ -217,7 +217,7 @@ def convert_errors(owner: str, error: type[GaitError], remedy: str = "") -> Iter
     """Convert errors of a file or its content to another class, with their owner and what to do in the message."""
     try:
         yield
-    except (OSError, ValueError, RecursionError) as reason:
+    except (OSError, ValueError, RecursionError, OverflowError) as reason:
         message = getattr(reason, "strerror", None) or reason
         raise error(f"{owner}: {message}{remedy and f'; {remedy}'}") from reason
 

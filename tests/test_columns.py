@@ -45,6 +45,7 @@ def test_the_same_numbers_are_read(text: str) -> None:
         (",f\n3,1\n3,1\n", "column 1 has no name"),
         ("f,f\n1,2\n", "two columns have the same name 'f'"),
         ("f,x\n1,two\n", "line 2: expected a number, got 'two'"),
+        ("f,x\n1,0.3_1\n", "line 2: expected a number, got '0.3_1'"),
         ("f,x\n1," + "9" * 131_073, "line 2: field larger than field limit"),
         ("# nothing\n", "has no rows"),
     ],

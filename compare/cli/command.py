@@ -117,6 +117,8 @@ def _check_values(context: typer.Context, given: Mapping[str, Any]) -> None:
         source = context.get_parameter_source(name)
         texts = value if isinstance(value, (list, tuple)) else [value]
         is_empty = any(isinstance(text, str) and not text.strip() for text in texts)
+        # An empty path and the current folder are the same once they are parsed.
+        is_empty |= value == Path() and any(argument == "" or argument.endswith("=") for argument in sys.argv)
         if is_empty and source is not None and source.name == "COMMANDLINE":
             option = next(parameter.opts[0] for parameter in context.command.params if parameter.name == name)
             raise InputError(f"{option} is an empty text; give a value, or leave it out (is a shell variable not set?)")

@@ -254,6 +254,8 @@ def test_a_push_after_the_end_is_refused(standing: Plan) -> None:
         ("[balance]\ndcm_gain = -1.0", "dcm_gain of a balance feedback must be from 0 to 1000, got -1.0"),
         ("[controller]\nkp = 1e308\nkd = 1", "kp of a controller must be from 1e-06 to 1e+09, got 1e+308"),
         ("[balance]\n[controller]\nkp = 1\nkd = 1", "a drive has a controller or a feedback, got both"),
+        ("period_s = " + 400 * "9", "drive.toml': int too large to convert to float"),
+        ("period_s = " + 3000 * "[", "drive.toml': maximum recursion depth exceeded"),
     ],
 )
 def test_settings_in_a_file_that_are_not_allowed_are_refused(tmp_path: Path, text: str, words: str) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.files import read_text
+from nlp_gait.files import convert_errors, read_text
 from nlp_gait.simulation.balance.controller import Balance
 from nlp_gait.simulation.drive import DRIVES, Drive
 
@@ -24,12 +24,10 @@ def load_drive(name: str) -> Drive:
             raise unknown("drive", name, DRIVES)
         return DRIVES[name]
     text = read_text(Path(name), "drive")
-    try:
+    with convert_errors(f"drive {name!r}", InputError):
         raw = tomllib.loads(text)
         feedback = decode(Balance, raw.pop("balance"), "balance") if "balance" in raw else None
         return decode(Drive, raw, given={"feedback": feedback})
-    except ValueError as error:
-        raise InputError(f"drive {name!r}: {error}") from error
 
 
 def choose_feedback(drive: Drive, name: str) -> Drive:

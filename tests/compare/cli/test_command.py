@@ -1,5 +1,6 @@
 """How groups of options become the options of a command."""
 
+import sys
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -7,6 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from compare.cli import app
 from compare.cli.command import command
 from nlp_gait.errors import InputError
 
@@ -59,3 +61,9 @@ MARKET.command()(weigh)
 def test_a_group_refuses_as_a_command_does(arguments: list[str], status: int, words: str) -> None:
     done = RUN.invoke(MARKET, arguments)
     assert done.exit_code == status and words in done.stderr
+
+
+def test_an_empty_path_is_not_the_current_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    arguments = ["import", "walk12", "finals.csv", "--as", "GA", "--out", ""]
+    monkeypatch.setattr(sys, "argv", ["nlp-gait", *arguments])
+    assert "--out is an empty text" in RUN.invoke(app, arguments).stderr
