@@ -184,9 +184,9 @@ def _check_change(problem: GaitProblem, model: ExactModel) -> None:
     finite = [cost for cost in costs if math.isfinite(cost)]
     change = max(finite, default=0.0) - min(finite, default=0.0)
     if 0.0 < change < LEAST_CHANGE:
-        unit = problem.objective.unit
+        unit = "" if problem.objective.unit == "1" else f" {problem.objective.unit}"
         raise InputError(
-            f"{problem.name}: {problem.objective.name} changes by {change:.2g} {unit} only between points within the bounds; "
+            f"{problem.name}: {problem.objective.name} changes by {change:.2g}{unit} only between points within the bounds; "
             "use a unit in which it changes by about 1"
         )
 

@@ -153,7 +153,9 @@ def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int =
     violations = exact.find_violated(values)
     status = best.status
     if not best.converged:
-        names = ", ".join(f"{row.name} (by {row.violation:.3g} {row.unit})" for row in violations[:3])
+        names = ", ".join(
+            f"{row.name} (by {row.violation:.3g}{'' if row.unit == '1' else f' {row.unit}'})" for row in violations[:3]
+        )
         status = f"no start converged; ending of the best feasible one: {best.status}"
         if not best.feasible:
             status = f"no start converged to a feasible point; ending of the least infeasible one: {best.status}"

@@ -80,6 +80,12 @@ def _make(parts: _Parts, objective: Objective, tolerance: float) -> GaitProblem:
             raise InputError(
                 f"variable {name} needs finite bounds, got {low:g} and {high:g}: searches draw points in them"
             )
+    variables = tuple(
+        Variable(name=name, unit=unit, lower=low, upper=high)
+        for name, (low, high, unit) in zip(names, parts.bounds, strict=True)
+    )
+    if not tolerance >= 0.0:
+        raise InputError(f"tolerance must be >= 0, got {tolerance}")
     values, lows, highs = ([row[k] for row in parts.rows.values()] for k in range(3))
     function = ca.Function("problem", [*parts.x, *parts.p], [parts.f, *values])
     limits = ca.Function("limits", list(parts.p), [*lows, *highs])
@@ -117,10 +123,7 @@ def _make(parts: _Parts, objective: Objective, tolerance: float) -> GaitProblem:
     return GaitProblem(
         name=UNNAMED,
         title=f"Problem of {len(names)} variable{'s' * (len(names) > 1)}",
-        variables=tuple(
-            Variable(name=name, unit=unit, lower=low, upper=high)
-            for name, (low, high, unit) in zip(names, parts.bounds, strict=True)
-        ),
+        variables=variables,
         own_parameters=tuple(
             Parameter(name=name, unit="1", default=float(value), description="")
             for name, value in zip(parameters, parts.values, strict=True)
@@ -156,6 +159,7 @@ def _read_expressions(objective: Any, constraints: Any, x: Any, p: Any) -> _Part
         raise InputError(f"the objective must be a scalar CasADi expression, got {format_value(objective)}")
     if not isinstance(x, Mapping):
         raise InputError(f"x must be the bounds by variable, such as {{'h': (0.1, 2.0)}}, got {format_value(x)}")
+    constraints = [constraints] if isinstance(constraints, (MX, SX)) else constraints
     named = constraints if isinstance(constraints, Mapping) else {f"g{k}": g for k, g in enumerate(constraints, 1)}
     for name, constraint in named.items():
         if not isinstance(constraint, type(objective)):
@@ -163,13 +167,17 @@ def _read_expressions(objective: Any, constraints: Any, x: Any, p: Any) -> _Part
                 f"constraint {name} must be a comparison of {type(objective).__name__} expressions, such as shear <= 13600, "
                 f"got {format_value(constraint)}"
             )
-    symbols = {s.name(): s for s in ca.symvar(ca.veccat(objective, *named.values()))}
+    used = ca.symvar(ca.veccat(objective, *named.values()))
+    symbols = {s.name(): s for s in used}
+    if len(symbols) < len(used):
+        repeated = next(s.name() for s in used if s is not symbols[s.name()])
+        raise InputError(f"two symbols have the same name {repeated!r}; rename one of them")
     p = {} if isinstance(p, Sequence) and not len(p) else p
     if not isinstance(p, Mapping):
         raise InputError(f"p must be the values of parameters by name, got {format_value(p)}")
     for name in [*x, *p]:
         if name not in symbols:
-            raise InputError(f"no expression contains {name!r}; they contain {', '.join(symbols)}")
+            raise InputError(f"no expression contains {name!r}; they contain {', '.join(symbols) or 'no symbol'}")
     for name in symbols:
         if (name in x) == (name in p):
             raise InputError(

@@ -118,6 +118,9 @@ BOX = {"x": (0, 1), "y": (0, 1)}
     [
         ((X + Y,), {"x": {"x": (0, 1)}}, "give 'y' either bounds, x={'y': .* or a value, p={'y': value}"),
         ((X,), {"x": BOX}, "no expression contains 'y'; they contain x"),
+        ((X + Y,), {"x": BOX | {"x": (2, 1)}}, "variable 'x': lower must be below upper, got 2.0 and 1.0"),
+        ((X + Y + SX.sym("x"),), {"x": BOX}, "two symbols have the same name 'x'"),
+        ((X + Y,), {"x": BOX, "tolerance": -1.0}, "tolerance must be >= 0, got -1.0"),
         ((X + Y, [True]), {"x": BOX}, "constraint g1 must be a comparison of SX expressions, .*, got True"),
         ((X + Y, [SX(1) <= X / X * 0 + SX.sym("c")]), {"x": BOX, "p": {"c": 1}}, "constraint g1 contains no variable"),
         (({"x": X, "f": X},), {"lbx": [0, 1], "ubx": 1}, "lbx must be one number or 1, got 2"),
