@@ -17,7 +17,7 @@ from compare.cli.options import Code, name_all, parse_numbers
 from compare.cli.printing import Output, Rows, show_progress
 from compare.judge import find_faults
 from compare.study.record import load_result_or_record
-from nlp_gait.errors import InputError, MissingExtraError, OutputError
+from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
 from nlp_gait.simulation.video import Frame, check_frames, check_video_path, write_video
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.measurements import ClimbMeasurements, Measurements, Walk
     from nlp_gait.simulation.plan import Plan
-    from nlp_gait.simulation.simulate import Conditions, Push, Simulation, SimulationRun
+    from nlp_gait.simulation.simulate import Conditions, Simulation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +94,6 @@ def simulate(
     out: Annotated[Path | None, OUTPUT] = None,
     page: Annotated[Path | None, Option(metavar="FILE.html"), OUTPUT_FILE] = None,
     video: Annotated[Path | None, OUTPUT_FILE] = None,
-    live: Annotated[bool, Option("--live")] = False,
     world: ConditionOptions,
     drive_options: DriveOptions,
 ) -> Output:
@@ -116,7 +115,7 @@ def simulate(
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
     from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, list_frames, make_skeleton
-    from nlp_gait.simulation.simulate import SETTLE_TIME, SimulationRun, prepare
+    from nlp_gait.simulation.simulate import SETTLE_TIME, prepare, simulate_plan
 
     load_mujoco(pictures=video is not None)
     if video is not None:
@@ -131,10 +130,9 @@ def simulate(
         faults = find_faults(gait, result)
     if video is not None:
         check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
-    simulation = SimulationRun(plan, conditions, drive)
-    pushes, failures = _watch(simulation) if live else ([], [])
-    trace, written = simulation.finish(), [path for path in (page, video) if path is not None]
-    data, parts = _report(plan, trace, drive, pushes)
+    trace = simulate_plan(plan, conditions, drive)
+    written = [path for path in (page, video) if path is not None]
+    data, parts = _report(plan, trace, drive)
     data["faults"], parts = faults, [*faults, *parts]
     model, _ = prepare(plan, conditions, drive)
     if page is not None:
@@ -145,7 +143,7 @@ def simulate(
         xml = make_plan_model(plan, drive, conditions.friction, conditions.bumps)
         written += _write_report(folder, data, xml, trace.signals(plan.joints))
         written.append(plot_simulation(plan, trace, drive, folder / "simulation.png"))
-    return Output(data=data, parts=parts, written=written, failures=failures)
+    return Output(data=data, parts=parts, written=written)
 
 
 def _write_page(page: Path, skeleton: Skeleton, trace: Simulation) -> None:
@@ -168,14 +166,14 @@ def _write_report(folder: Path, data: dict[str, Any], model: str, histories: Sig
     return [report, xml, arrays]
 
 
-def _report(plan: Plan, trace: Simulation, drive: Drive, pushes: list[Push]) -> tuple[dict[str, Any], list[str | Rows]]:
+def _report(plan: Plan, trace: Simulation, drive: Drive) -> tuple[dict[str, Any], list[str | Rows]]:
     """Return what is measured in a simulation, as data and in words."""
     from nlp_gait.simulation.measurements import measure, measure_climb, measure_walk
 
     walk = None if plan.steps is None else measure_walk(plan, trace, drive, plan.steps)
     report = measure(plan, trace, drive) if walk is None else walk.measurements
     mode = "in open loop" if drive.feedback is None else "with balance feedback"
-    data = {"schema": 1, **asdict(report), "mode": mode, "pushes": [asdict(push) for push in pushes]}
+    data = {"schema": 1, **asdict(report), "mode": mode}
     parts = [*_describe(report, mode)]
     if walk is not None:
         data |= {"walked_m": walk.walked_m, "planned_m": walk.planned_m, "energy_J": walk.engine_J}
@@ -191,16 +189,6 @@ def _report(plan: Plan, trace: Simulation, drive: Drive, pushes: list[Push]) -> 
             for hit in climb.riser_hits
         ]
     return data, parts
-
-
-def _watch(simulation: SimulationRun) -> tuple[list[Push], list[str]]:
-    """Show a simulation; return the pushes of the arrow keys, and why there is no window: it is recorded without one."""
-    from nlp_gait.simulation.live import watch
-
-    try:
-        return watch(simulation), []
-    except (OutputError, MissingExtraError) as error:
-        return [], [f"{error}; it was simulated without one"]
 
 
 def _show_pictures(pictures: Iterator[Frame], count: int) -> Iterator[Frame]:
