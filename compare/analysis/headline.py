@@ -127,14 +127,15 @@ def _write_second(comparison: Comparison) -> str:
     """Return what else matters: a new best value, or from which solvers the user's differs."""
     if comparison.better is not None:
         return describe_better(comparison)
+    feasible = {solver.name for solver in comparison.solvers if solver.feasible}
     for solver in comparison.solvers:
         results = comparison.compare_with_others(solver.name) if solver.is_user_defined else {}
         places = [
             f"{word} {join_words(map(name_solver, others[:NAMED]))}"
             for word, sign in (("better than", 1), ("worse than", -1), ("not distinguishable from", 0))
-            if (others := [other for other, result in results.items() if result == sign])
+            if (others := [other for other, result in results.items() if result == sign and other in feasible])
         ]
-        if places and not comparison.power:
+        if places and solver.name in feasible and not comparison.power:
             return f"By rank-sum tests {solver.title} is {join_words(places)}."
     return ""
 

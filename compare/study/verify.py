@@ -54,6 +54,8 @@ class Verification(NamedTuple):
         """The result in words, with the chance that altered runs were not among the repeated ones."""
         wrong = sum(row.kind != "not repeated" for row in self.rows)
         total = len(self.records)
+        if self.holds and total and not self.evaluated + self.repeated:
+            return f"none of the {total} runs was checked, for the reasons above"
         rows = f"{wrong} row{'s' * (wrong > 1)} of the table must not be there"
         result = "nothing differs" if self.holds else rows
         text = f"{self.evaluated} points evaluated and {self.repeated} of {total} runs repeated: {result}"

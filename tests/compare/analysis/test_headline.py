@@ -138,6 +138,13 @@ def test_the_users_solver_is_named_with_those_from_which_it_differs() -> None:
     )
 
 
+def test_a_solver_without_feasible_runs_is_not_compared() -> None:
+    """Three runs against three failures are not significant, but nobody would call them equal."""
+    records = make_runs(mine=[10.5] * 3, ipopt=[10.0] * 20, broken=[None] * 3)
+    records = [replace(r, inputs=replace(r.inputs, code="0" * 64 if r.solver == "mine" else "")) for r in records]
+    assert "By rank-sum tests mine is worse than IPOPT." in write_headline(compare_problems(records)[0])
+
+
 def test_many_problems_have_one_headline() -> None:
     many = [replace(r, problem=f"walk-{k}") for k in range(5) for r in study()]
     (headline,) = write_headlines(compare_problems(many))

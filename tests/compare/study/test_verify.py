@@ -15,7 +15,7 @@ import pytest
 from compare.study.pack import INDEX, pack_study, unpack_archive
 from compare.study.run import ProblemSpec, Stop, plan_runs
 from compare.study.study import Study, read_records, run_study, write_records
-from compare.study.verify import Verification, compute_chance, verify_study
+from compare.study.verify import Difference, Verification, compute_chance, verify_study
 from nlp_gait.errors import InputError
 from tests.robots.custom import humanoid
 
@@ -72,6 +72,12 @@ ALTERATIONS: dict[tuple[str, int], tuple[Alteration, str]] = {
     ("ga", 2): (lambda r: r.update(status="converged"), "status: recorded '\"converged\"'"),
     ("ipopt", 0): (lambda r: r.update(feasible=False), "it is called infeasible"),
 }
+
+
+def test_a_study_of_which_nothing_is_checked_is_said_to_be_unchecked(sound: Path) -> None:
+    rows, (records, _) = [Difference("pso, run 0", "not repeated", "its code is not named")], read_records(sound)
+    verification = Verification(rows=rows, records=records, repeated=0, evaluated=0)
+    assert verification.sentence == "none of the 7 runs was checked, for the reasons above"
 
 
 def test_edited_records_are_named(sound: Path, tmp_path: Path) -> None:
