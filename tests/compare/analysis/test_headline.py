@@ -139,7 +139,7 @@ def test_the_users_solver_is_named_with_those_from_which_it_differs() -> None:
 
 
 def test_a_solver_without_feasible_runs_is_not_compared() -> None:
-    """Three runs against three failures are not significant, but nobody would call them equal."""
+    """Three runs against three failures are not significant, which says nothing about the failed solver."""
     records = make_runs(mine=[10.5] * 3, ipopt=[10.0] * 20, broken=[None] * 3)
     records = [replace(r, inputs=replace(r.inputs, code="0" * 64 if r.solver == "mine" else "")) for r in records]
     assert "By rank-sum tests mine is worse than IPOPT." in write_headline(compare_problems(records)[0])
