@@ -30,8 +30,8 @@ REASONS = {
 }
 # Variables from which one iteration may outlast the time limit: of the 15,754 of stairs-track's, one took 591 s.
 LARGE = 5000
-# Iterates in a row of an attempt that may violate a row by more than its scale. Others of 20 starts of each gait take at most
-# 16, a few of the stairs' 28; those with more crept for 100 to 350 iterations.
+# Iterates in a row of an attempt that may violate a row by more than its scale. Most starts of phases and cycles have at
+# most 16, a few of the planned stairs 28; those with more crept for 100 to 350 iterations.
 LONGEST_INFEASIBLE = 20
 GRACE_S = 5.0  # after the time limit, to finish an iteration
 
