@@ -88,5 +88,5 @@ def verify(
         parts=[Rows("differences", ("what", "", "why"), rows)] if rows else [],
         written=written,
         answer=[result.sentence],
-        failures=[] if result.holds else ["the study does not follow from its inputs, see the table"],
+        failures=[] if result.holds else ["the study is not verified, see the table"],
     )

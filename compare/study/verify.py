@@ -46,15 +46,20 @@ class Verification(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether nothing differs and nothing is missing."""
-        return all(row.kind == "not repeated" for row in self.rows)
+        """Whether something was checked, nothing differs and nothing is missing."""
+        return self.is_checked and all(row.kind == "not repeated" for row in self.rows)
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether a point was evaluated or a run repeated, or there are none."""
+        return not self.records or bool(self.evaluated + self.repeated)
 
     @property
     def sentence(self) -> str:
         """The result in words, with the chance that altered runs were not among the repeated ones."""
         wrong = sum(row.kind != "not repeated" for row in self.rows)
         total = len(self.records)
-        if self.holds and total and not self.evaluated + self.repeated:
+        if not self.is_checked:
             return f"none of the {total} runs was checked, for the reasons above"
         rows = f"{wrong} row{'s' * (wrong > 1)} of the table must not be there"
         result = "nothing differs" if self.holds else rows

@@ -78,6 +78,7 @@ def test_a_study_of_which_nothing_is_checked_is_said_to_be_unchecked(sound: Path
     rows, (records, _) = [Difference("pso, run 0", "not repeated", "its code is not named")], read_records(sound)
     verification = Verification(rows=rows, records=records, repeated=0, evaluated=0)
     assert verification.sentence == "none of the 7 runs was checked, for the reasons above"
+    assert not verification.holds
 
 
 def test_edited_records_are_named(sound: Path, tmp_path: Path) -> None:
