@@ -17,18 +17,19 @@ from nlp_gait.errors import GaitError
 from nlp_gait.formulation import GaitProblem, Grid
 from nlp_gait.limits import FootClearance, FrictionCone, Limit, Point, Samples, make_rows_at_samples
 from nlp_gait.proofs.guarantee import guarantee
+from nlp_gait.providers import LIMITS
 from nlp_gait.symbolic.nonsmooth import Exact
 
-LIMITS = {"FrictionCone": "friction[", "FootClearance": "foot_clearance["}  # and their rows
+ROWS = {"FrictionCone": "friction[", "FootClearance": "foot_clearance["}  # by limit
 OPTIMUM = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)  # of nao-ssp, to printed digits
 ONE = """
 from nlp_gait.limits import Limit, make_parameters, make_rows_at_samples
 
 class HipHeight(Limit):
-    parameters = make_parameters(("least_hip_m", "m", 0.2, "least height of the hip", 0.0, 1.0))
+    parameters = make_parameters(("least_torso_m", "m", 0.2, "least height of the torso's origin", 0.0, 1.0))
 
     def add(self, at, samples, ops):
-        return [make_rows_at_samples("hip_height", "m", samples.hip[2, :], ("hip",), at["least_hip_m"])], {}
+        return [make_rows_at_samples("hip_height", "m", samples.hip[2, :], ("hip",), at["least_torso_m"])], {}
 """
 
 
@@ -51,12 +52,13 @@ def problems() -> Callable[[str], GaitProblem]:
 def test_every_limit_has_rows_in_every_kind_of_phase(problems: Callable[[str], GaitProblem], name: str) -> None:
     problem = problems(name)
     rows = build_exact_model(problem).row_names
-    assert any("friction[" in row for row in rows)
-    assert any("foot_clearance[" in row for row in rows) == ("dsp" not in name)
+    assert set(ROWS) == set(LIMITS)
+    found = {limit for limit, stem in ROWS.items() if any(stem in row for row in rows)}
+    assert found == set(ROWS) - ({"FootClearance"} if "dsp" in name else set())
     assert set(build_nlp(problem).row_names) == {row for row in rows if not row.startswith("bounds[")}
     x = 0.5 * (problem.lower + problem.upper)
     values = build_exact_model(problem).at(x, problem.p)
-    added = [value for row, value in zip(rows, values.g, strict=True) if "friction[" in row or "clearance[" in row]
+    added = [value for row, value in zip(rows, values.g, strict=True) if any(stem in row for stem in ROWS.values())]
     assert np.isfinite(added).all()
 
 
@@ -178,7 +180,7 @@ def test_your_own_limit_from_a_file(tmp_path: Path) -> None:
     file.write_text(ONE)
     problem = nlp_gait.load("nao-ssp", intervals=3, limits=f"{file}:HipHeight")
     assert "hip_height[hip, 3]" in build_exact_model(problem).row_names
-    assert problem.value("least_hip_m") == 0.2
+    assert problem.value("least_torso_m") == 0.2
 
 
 @pytest.mark.parametrize(

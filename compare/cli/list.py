@@ -14,6 +14,7 @@ from typer import Argument, Option
 from compare.cli.command import OUTPUT_FILE, command
 from compare.cli.printing import Output, Rows
 from nlp_gait.errors import InputError
+from nlp_gait.providers import LIMITS
 from nlp_gait.user_code import find_entry_points
 
 if TYPE_CHECKING:
@@ -102,6 +103,7 @@ def _list_all() -> Output:
         f"algorithms: {', '.join(listed['algorithms'])}",
         f"for several objectives (pareto): {', '.join(listed['fronts'])}",
         f"robots: {', '.join(listed['robots'])}",
+        f"limits of gaits, for --limit: {', '.join(LIMITS)}",
     ]
     for kind, packages in installed.items():
         names = ", ".join(f"{name} ({value})" for name, value in packages.items())
@@ -114,11 +116,19 @@ def _list_all() -> Output:
 
 def _describe_problem(name: str, options: Mapping[str, Any]) -> Output:
     import nlp_gait
+    from nlp_gait.formulation.registry import describe_options, find_maker, list_choices
 
-    problem = nlp_gait.load(name, **options)
+    problem, make = nlp_gait.load(name, **options), find_maker(name)
+    words, choices = describe_options(make), list_choices(make)
     where = "".join(f" with --{key} {value}" for key, value in options.items())
-    limits = [(v.name, f"{v.lower:g}", f"{v.upper:g}", v.unit, v.description) for v in problem.variables]
+    variables = [(v.name, f"{v.lower:g}", f"{v.upper:g}", v.unit, v.description) for v in problem.variables]
     parameters = [(q.name, f"{q.default:g}", q.unit, q.description) for q in problem.own_parameters]
+    chosen = [(k, str(value), words.get(k, ""), "\n".join(choices.get(k, ()))) for k, value in problem.options.items()]
+    tables = (
+        Rows(f"{name}{where}: variables", ("name", "lower", "upper", "unit", "description"), variables),
+        Rows(f"{name}: parameters, for --set", ("name", "default", "unit", "description"), parameters),
+        Rows(f"{name}: options, for --set", ("name", "value", "description", "one of"), chosen),
+    )
     return Output(
         data={
             "problem": name,
@@ -127,9 +137,7 @@ def _describe_problem(name: str, options: Mapping[str, Any]) -> Output:
             "parameters": _select_attributes(problem.own_parameters, "name", "unit", "default", "description"),
         },
         parts=[
-            Rows(f"{name}{where}: variables", ("name", "lower", "upper", "unit", "description"), limits),
-            Rows(f"{name}: parameters, for --set", ("name", "default", "unit", "description"), parameters),
-            "options: " + ", ".join(f"{key}={value}" for key, value in problem.options.items()),
+            *(rows for rows in tables if rows.rows),
             f"bounds of variables are parameters: --set {problem.names[0]}.lower=...",
         ],
     )

@@ -16,7 +16,7 @@ DOORS = {
     "nlp_gait": (),
     "nlp_gait.formulation": (),
     "nlp_gait.formulation.solution": ("ActiveConstraint", "ConstraintValue", "Evaluations", "Outcome", "SolveTime"),
-    "nlp_gait.limits": ("FootClearance", "FrictionCone", "Limit", "Samples", "make_parameters", "make_rows_at_samples"),
+    "nlp_gait.limits": (),
     "nlp_gait.robots": (),
     "nlp_gait.gaitbench": (),
     "nlp_gait.simulation.plan": ("Plan", "make_plan"),

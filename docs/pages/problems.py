@@ -7,17 +7,15 @@ import inspect
 import json
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal, get_args, get_origin, get_type_hints
 
 from compare.analysis.units import with_unit
 from docs.difficulty import Best, Difficulty, Reached, difficulties
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.decoding import find_groups
 from nlp_gait.formulation import GaitProblem, list_problems, load
-from nlp_gait.formulation.registry import find_maker
+from nlp_gait.formulation.registry import describe_options, find_maker, list_choices
 from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaitbench.facts import DEFINITIONS, load_facts
 from nlp_gait.proofs.certificate import load_certificates
@@ -28,7 +26,6 @@ GAITS = "gaits"  # folder at the root of the site, see ``front``
 LEFT_OUT = ("gaitbench",)  # a suite, with a page of its own
 SHOWN = 12  # variables, and binding rows, on a page
 SAME = 1e-6  # relative; another processor rounds otherwise
-ARGUMENT = re.compile(r"^ {4}(\w+): (.+(?:\n {8,}.+)*)", re.MULTILINE)
 SOURCE = re.compile(r"^Source:\n((?: {4}.+\n?)+)", re.MULTILINE)
 INTRODUCTION = """# Problems
 
@@ -289,12 +286,11 @@ def _parameters(problem: GaitProblem) -> str:
 
 def _options(problem: GaitProblem) -> str:
     make = find_maker(problem.name)
-    hints = get_type_hints(make)
-    rows = []
-    for name, parameter in inspect.signature(make).parameters.items():
-        hint = hints.get(name)
-        choices = ", ".join(f"`{choice}`" for choice in get_args(hint)) if get_origin(hint) is Literal else ""
-        rows.append((code(name), code(str(parameter.default)), choices))
+    choices = list_choices(make)
+    rows = [
+        (code(name), code(str(parameter.default)), ", ".join(map(code, choices.get(name, ()))))
+        for name, parameter in inspect.signature(make).parameters.items()
+    ]
     text = "What they mean is [in one table](index.md#options)."
     return page("## Options", text, table(("option", "default", "one of"), rows)).strip()
 
@@ -303,21 +299,13 @@ def list_options(problems: Sequence[GaitProblem]) -> str:
     """Return the meaning of every option once, with the problems where it means this."""
     meanings: dict[tuple[str, str], list[str]] = {}
     for problem in problems:
-        words = dict(_option_words(problem))
-        for name in inspect.signature(find_maker(problem.name)).parameters:
+        make = find_maker(problem.name)
+        words = describe_options(make)
+        for name in inspect.signature(make).parameters:
             meanings.setdefault((name, words.get(name, "")), []).append(problem.name)
     rows = [(code(name), literal(words), ", ".join(users)) for (name, words), users in sorted(meanings.items())]
     text = "`--set NAME=VALUE`, or keywords of `nlp_gait.load`; parameters and bounds are set alike, without rebuilding anything."
     return page("## Options", text, table(("option", "what", "of"), rows)).strip()
-
-
-def _option_words(problem: GaitProblem) -> Iterator[tuple[str, str]]:
-    """Return the meaning of options, from the docstrings of the maker and of the classes that declare them."""
-    make = find_maker(problem.name)
-    groups = find_groups(make).values()
-    for declared in (make, *(kind for group in groups for kind in reversed(inspect.getmro(group)))):
-        for name, words in ARGUMENT.findall(inspect.cleandoc(declared.__doc__ or "")):
-            yield name, " ".join(words.split()).rstrip(".")
 
 
 def _difficulty(problem: GaitProblem, found: Difficulty | None) -> str:

@@ -26,6 +26,7 @@ from nlp_gait.symbolic.nonsmooth import Exact
 # More intervals and samples than this are of no use, and such a problem takes too long to build.
 LARGEST_COUNT = 10_000
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
+ARGUMENT = re.compile(r"^ {4}(\w+): (.+(?:\n {8,}.+)*)", re.MULTILINE)  # of a docstring
 GRID = ("intervals", "samples_per_interval")  # options whose product has the same limit as each
 
 Maker = Callable[..., GaitProblem]
@@ -140,7 +141,7 @@ class UserMaker:
 
 def check_options(make: Maker, options: Mapping[str, Any]) -> None:
     """Check that a maker has these options, and allows their values; raises UnknownNameError or InputError."""
-    parameters, allowed = inspect.signature(make).parameters, _list_choices(make)
+    parameters, allowed = inspect.signature(make).parameters, list_choices(make)
     for option, given in options.items():
         value = _to_python(str(given) if isinstance(given, AddedLimits) else given)
         if option not in parameters:
@@ -182,8 +183,16 @@ def _to_python(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
+def describe_options(make: Maker) -> dict[str, str]:
+    """Return the meaning of a maker's options by name, from the docstrings of the maker and of the classes that declare them."""
+    groups = (kind for group in find_groups(make).values() for kind in reversed(inspect.getmro(group)))
+    texts = [inspect.cleandoc(declared.__doc__ or "") for declared in (make, *groups)]
+    return {name: " ".join(words.split()).rstrip(".") for text in texts for name, words in ARGUMENT.findall(text)}
+
+
 @functools.cache
-def _list_choices(make: Maker) -> dict[str, tuple[str, ...]]:
+def list_choices(make: Maker) -> dict[str, tuple[str, ...]]:
+    """Return the values that a maker's options allow, of options with a list of them."""
     return {name: get_args(hint) for name, hint in get_type_hints(make).items() if get_origin(hint) is Literal}
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import casadi as ca
 from casadi import MX
@@ -32,13 +32,13 @@ class Goal:
 
     objective: Objective = POWER  # name and unit
     power: PowerModel = compute_paper_power  # of the motors; if it is not the paper's, the paper's is an index too
-    figure: Callable[[Samples], MX] | None = None  # of the samples; None for power
+    figure: Callable[[Samples, Nonsmooth], MX] | None = None  # of the samples; None for power
     reads: tuple[Quantity, ...] = ()  # see ``Limit.reads``
 
     def evaluate(self, point: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX]]:
         """Return the objective and the indexes: power, and what is minimised instead, or the power of the paper's motors."""
         if self.figure is not None:
-            figure = self.figure(samples)
+            figure = self.figure(samples, ops)
             return figure, {"power_W": compute_paper_power(point, samples, Exact()), self.objective.name: figure}
         power = self.power(point, samples, ops)
         if self.power is compute_paper_power:
@@ -50,19 +50,20 @@ def _average_squared_rate(values: MX, samples: Samples) -> MX:
     return ca.sumsqr(values[:, 1:] - values[:, :-1]) / samples.step_s**2 / samples.steps
 
 
-# Goals that replace the power.
+Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
+# Goals that replace the power, by criterion.
 INSTEAD = {
     "jerk": Goal(
         objective=Objective(name="joint_jerk", unit="rad^2/s^6"),
-        figure=lambda samples: _average_squared_rate(samples.qdd, samples),
+        figure=lambda samples, ops: _average_squared_rate(samples.qdd, samples),
         reads=(Samples.qdd,),
     ),
     "torque": Goal(
         objective=Objective(name="squared_torque", unit="(Nm)^2"),
-        figure=lambda samples: samples.average(ca.sum1(samples.torque**2)),
+        figure=lambda samples, ops: samples.average(ca.sum1(samples.torque**2)),
     ),
     "torque-smoothness": Goal(
         objective=Objective(name="torque_rate", unit="(Nm/s)^2"),
-        figure=lambda samples: _average_squared_rate(samples.torque, samples),
+        figure=lambda samples, ops: _average_squared_rate(samples.torque, samples),
     ),
 }

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -16,7 +16,7 @@ from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import Body, Support
 from nlp_gait.gaits.biped.bounds import make_usual_bounds
-from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
+from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Criterion, Goal
 from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Loader
@@ -24,7 +24,6 @@ from nlp_gait.gaits.biped.sequence import Sequence
 from nlp_gait.gaits.biped.skeleton import draw_robot
 from nlp_gait.symbolic.nonsmooth import Exact
 
-Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
 DRAWS = 50  # of a start point, at most
 
 

@@ -7,9 +7,10 @@ from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.assembly import Quadrature
 from nlp_gait.gaits.biped.body import Body, Support
 from nlp_gait.gaits.biped.curves import Trajectory
+from nlp_gait.gaits.biped.goals import Criterion
 from nlp_gait.gaits.biped.loads import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import Derivatives
-from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal, make_phase_problem
+from nlp_gait.gaits.biped.phase_problem import make_goal, make_phase_problem
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 
 SPLINE_SAMPLES = 4  # default samples in each interval of a spline, which can bend between 11 samples; a cubic cannot
@@ -21,8 +22,7 @@ class RobotOptions:
 
     Attributes:
         robot: name of the robot, or its file: URDF, MJCF or JSON
-        limits: more limits of every phase, separated by commas: FrictionCone, FootClearance, or your own, FILE.py:NAME; see
-            ``nlp_gait.limits``
+        limits: more limits of every phase, separated by commas: those that ``nlp-gait list`` names, or your own, FILE.py:NAME
     """
 
     robot: str = "nao-v5"
