@@ -1,33 +1,24 @@
-"""A limit and a joint between phases, added as under "To add a ..." in docs/developing.md: each is one class."""
+"""A limit, added as under "To add a ..." in docs/developing.md: it is one class."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-import casadi as ca
 import numpy as np
-import pytest
 
 import nlp_gait
 from nlp_gait.formulation import (
     Constraint,
     Grid,
-    InstantPoint,
     Parameter,
     Point,
-    Variable,
 )
-from nlp_gait.gaits.biped.body import Body, Support
-from nlp_gait.gaits.biped.cycle import make_cycle_problem, make_walking_cycle
+from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes
-from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase_problem import make_phase_problem
 from nlp_gait.gaits.biped.samples import Samples
 from nlp_gait.gaits.biped.support_phases import make_support_phase
-from nlp_gait.gaits.biped.switch import Switch, SwitchState
-from nlp_gait.gaits.humanoid.body import make_humanoid
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -61,27 +52,3 @@ def test_a_limit_of_a_gait_is_one_class() -> None:
     slower = nlp_gait.solve(problem.with_values(hip_rate_limit_rad_s=0.9 * own))
     assert slower.converged and slower.objective > solution.objective
     assert any(bound.name.startswith("hip_rate[") for bound in slower.active_constraints)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Push(Switch):
-    """A touch-down at which the hip gains a forward velocity, a variable."""
-
-    def make_variables(self, body: Body) -> list[Variable]:
-        return [Variable(name="push_m_s", unit="m/s", lower=0.0, upper=0.1, description="gained at touch-down")]
-
-    def change_state(self, body: Body, point: InstantPoint, before: SwitchState) -> SwitchState:
-        return before._replace(hip_velocity=before.hip_velocity + ca.vertcat(point["push_m_s"], 0, 0))
-
-
-@pytest.mark.parametrize("make", [make_nao, make_humanoid])
-def test_a_joint_between_phases_is_one_class(make: Callable[[str], Body]) -> None:
-    """The cycles of both families have its variables and its laws."""
-    body, grid = make("nao-v5"), Grid(intervals=2)
-    loads, push = make_divided_loads(body, "lever"), Push(name="touch_down")
-    cycle = make_walking_cycle(body, loads, grid, Goal(), at_given_speed=False, touch_down=push)
-    problem = make_cycle_problem(cycle)
-    x = problem.start_point(np.random.default_rng(0))
-    x[problem.variable_index("push_m_s")] = 0.05
-    single, double = (phase.signals(problem.at(x)).arrays["qd"] for phase in cycle.phases.values())
-    assert np.abs(double[0] - single[-1]).max() > 0.1

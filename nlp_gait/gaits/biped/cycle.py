@@ -22,7 +22,7 @@ from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase, ma
 from nlp_gait.gaits.biped.samples import Loader
 from nlp_gait.gaits.biped.sequence import BALANCE, ENERGY_PER_METRE, End, MotionSection, Sequence
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
-from nlp_gait.gaits.biped.switch import SOFT_LANDING, TORQUE_JUMP, Switch
+from nlp_gait.gaits.biped.switch import TORQUE_JUMP, limit_torque_jump
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 SPEED = "speed_m_s"
@@ -44,7 +44,6 @@ class WalkingCycle(Sequence):
     """A cycle sampled over both phases; of the variables, the step length is the last one."""
 
     sections: tuple[MotionSection, ...] = SECTIONS
-    touch_down: Switch = SOFT_LANDING
     at_given_speed: bool  # the step length is no decision variable but follows from the speed
 
     @property
@@ -91,9 +90,9 @@ class WalkingCycle(Sequence):
         energy = sum(sections.energies.values(), MX(0))
         mean = sum((sections.objectives[name] * time for name, time in sections.times.items()), MX(0)) / period
         single, double = sections.samples.values()
-        lift_off, jump = Switch(name="lift_off", mirrored=True).join(self.phases, extended, double, single, ops)
-        touch_down, landing = self.touch_down.join(self.phases, extended, single, double, ops)
-        rows = [*lift_off, *touch_down]
+        lift_off, jump = limit_torque_jump("lift_off", self.body, extended, double, single, mirrored=True)
+        touch_down, landing = limit_torque_jump("touch_down", self.body, extended, single, double)
+        rows = [lift_off, touch_down]
         if self.at_given_speed:
             lower, upper = (extended[f"{STEP}.{end}"] for end in ("lower", "upper"))
             rows.append(make_rows("step_length", "m", extended[STEP], lower, upper, over="once"))
@@ -117,20 +116,15 @@ class WalkingCycle(Sequence):
         return self.list_step_signals(point)[0]
 
 
-def make_walking_cycle(
-    body: Body, loads: Loader, grid: Grid, goal: Goal, *, at_given_speed: bool, touch_down: Switch = SOFT_LANDING
-) -> WalkingCycle:
+def make_walking_cycle(body: Body, loads: Loader, grid: Grid, goal: Goal, *, at_given_speed: bool) -> WalkingCycle:
     """Return both phases of the cycle, joined, each with the goal; at a given speed the step length follows from it."""
-    variables = make_cycle_variables(body, touch_down)
-    plans, margins = make_cycle_planners(body, touch_down), make_cycle_margins(body)
+    variables, margins = make_cycle_variables(body), make_cycle_margins(body)
     fields: dict[str, Any] = {"variables": variables, "grid": grid, "goal": goal}
     phases = {
         kind: make_phase(body, kind, margins[kind], loads, duration=TIMES[kind], plan=plan, **fields)
-        for kind, plan in plans.items()
+        for kind, plan in make_cycle_planners(body).items()
     }
-    return WalkingCycle(
-        body=body, variables=variables, phases=phases, at_given_speed=at_given_speed, touch_down=touch_down
-    )
+    return WalkingCycle(body=body, variables=variables, phases=phases, at_given_speed=at_given_speed)
 
 
 def make_cycle_margins(body: Body, right_x: str = STEP) -> dict[Support, BalanceMargins]:
@@ -157,8 +151,7 @@ def make_cycle_problem(cycle: WalkingCycle) -> GaitProblem:
             *(cycle.phases[p.kind].sample(cycle.read_section(p, point), Exact()).reach for p in cycle.sections)
         )
 
-    uniform = not cycle.at_given_speed and cycle.touch_down == SOFT_LANDING
-    start: Start | None = None if uniform else partial(draw_start, names, cycle.touch_down)
+    start: Start | None = partial(draw_start, names) if cycle.at_given_speed else None
     if not cycle.body.closed_form:
         start = make_start_within_reach(cycle, (SPEED,) if cycle.at_given_speed else (), reach, start)
     title = f"walking cycle: least {cycle.objective.name.replace('_', ' ')}"
@@ -166,17 +159,10 @@ def make_cycle_problem(cycle: WalkingCycle) -> GaitProblem:
     return problem if cycle.at_given_speed else replace(problem, with_other_options={SPEED: "objective=power"})
 
 
-def draw_start(
-    names: tuple[str, ...], touch_down: Switch, values: Mapping[str, float], rng: np.random.Generator
-) -> Array:
-    """Draw a start point within the bounds.
-
-    At a given speed its times give a step within its bounds, as far as their own bounds allow.
-    """
+def draw_start(names: tuple[str, ...], values: Mapping[str, float], rng: np.random.Generator) -> Array:
+    """Draw a start point within the bounds, whose times give a step within its bounds, as far as their own bounds allow."""
     x = draw_uniform(names, values, rng)
-    if SPEED in values:
-        times = [names.index(time) for time in TIMES.values()]
-        step = rng.uniform(values[f"{STEP}.lower"], values[f"{STEP}.upper"])
-        x[times] *= step / (values[SPEED] * x[times].sum())
-    start = dict(zip(names, x.tolist(), strict=True))
-    return np.array([*touch_down.change_start(start, values).values()])
+    times = [names.index(time) for time in TIMES.values()]
+    step = rng.uniform(values[f"{STEP}.lower"], values[f"{STEP}.upper"])
+    x[times] *= step / (values[SPEED] * x[times].sum())
+    return x

@@ -16,7 +16,7 @@ from nlp_gait.gaits.biped.bounds import make_lift_variable, make_time_variable
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.samples import Instant, Planner
 from nlp_gait.gaits.biped.support_phases import swing_foot
-from nlp_gait.gaits.biped.switch import SOFT_LANDING, SWITCHES, Switch, SwitchState, make_state_variables, read_state
+from nlp_gait.gaits.biped.switch import SWITCHES, SwitchState, make_state_variables, read_state
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, cubic, stack
 
@@ -35,14 +35,13 @@ class PhaseMotion(NamedTuple):
     turns: Angles = {}  # of torso and right foot, if they turn
 
 
-def make_cycle_variables(body: Body, touch_down: Switch = SOFT_LANDING) -> tuple[Variable, ...]:
+def make_cycle_variables(body: Body) -> tuple[Variable, ...]:
     """Return the variables of a cycle, most with the bounds of the phases; the step length is the last one."""
     states = [variable for switch in SWITCHES for variable in make_state_variables(body, switch, switch)]
     low, high = (round(share * body.leg_length_m, 3) for share in STEP_SHARES)
     step = Variable(name=STEP, unit="m", lower=low, upper=high, description="from foot to foot")
     return (
         *states,
-        *touch_down.make_variables(body),
         make_lift_variable(body),
         make_time_variable(body, Support.SINGLE),
         make_time_variable(body, Support.DOUBLE),
@@ -50,8 +49,8 @@ def make_cycle_variables(body: Body, touch_down: Switch = SOFT_LANDING) -> tuple
     )
 
 
-def make_cycle_planners(body: Body, touch_down: Switch) -> dict[Support, Planner]:
-    """Return the plans of both phases, which a switch at touch-down joins."""
+def make_cycle_planners(body: Body) -> dict[Support, Planner]:
+    """Return the plans of both phases, which are continuous at touch-down."""
     images = DM([c.image for c in body.coordinates])
     mirror = SX([1, -1, 1])
 
@@ -62,16 +61,15 @@ def make_cycle_planners(body: Body, touch_down: Switch) -> dict[Support, Planner
 
     def single(point: InstantPoint, phase: SX) -> PhaseMotion:
         lift_off, landed, step = read(point)
-        duration, speed = read_duration(point, Support.SINGLE), touch_down.read_landing_speed(point)
-        foot = swing_foot(-step, step, *body.ankle("R"), point[LIFT], duration, phase, speed)
+        duration = read_duration(point, Support.SINGLE)
+        foot = swing_foot(-step, step, *body.ankle("R"), point[LIFT], duration, phase)
         return PhaseMotion(lift_off, landed, duration, foot)
 
     def double(point: InstantPoint, phase: SX) -> PhaseMotion:
         (hip, velocity, angles, rates), landed, step = read(point)
         place = mirror * hip + vertcat(step, 0, 0)  # the mirror image of lift-off, a step further
-        begin = touch_down.change_state(body, point, landed)
         end = SwitchState(place, mirror * velocity, images * angles, images * rates)
-        return PhaseMotion(begin, end, read_duration(point, Support.DOUBLE), body.standing_ankle("R", step))
+        return PhaseMotion(landed, end, read_duration(point, Support.DOUBLE), body.standing_ankle("R", step))
 
     return {Support.SINGLE: make_planner(body, single), Support.DOUBLE: make_planner(body, double)}
 

@@ -207,7 +207,7 @@ class Sequence(ABC):
 
 
 def join_phases(phases: Iterable[Signals]) -> Signals:
-    """Join phases that begin at time zero; of both samples at a switch, equal without an impact, the earlier one is kept."""
+    """Join phases that begin at time zero; of both samples at a switch, which are equal, one is kept."""
     first, *later = phases
     arrays = {name: [array] for name, array in first.arrays.items()}
     for phase in later:

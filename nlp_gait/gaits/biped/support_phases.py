@@ -182,13 +182,9 @@ def swing_foot(
     lift: SX,
     duration: SX,
     phase: SX,
-    landing_m_s: SX | float = 0.0,
 ) -> Motion:
-    """Return the motion of a swinging foot's ankle (3,) over a parabola [m], from rest to rest (Table 3, rows 1 and 2).
-
-    With a forward velocity at its end the foot lands along the parabola.
-    """
-    forward = trajectories.cubic(start_x, end_x, SX(0), SX(landing_m_s), duration, phase)
+    """Return the motion of a swinging foot's ankle (3,) over a parabola [m], from rest to rest (Table 3, rows 1 and 2)."""
+    forward = trajectories.cubic(start_x, end_x, SX(0), SX(0), duration, phase)
     rise = trajectories.parabola_lift(forward, start_x, end_x, lift)
     return trajectories.stack(
         forward, trajectories.constant_motion(y), rise._replace(position=rise.position + ankle_height)

@@ -1,7 +1,6 @@
 """A switch between two phases: the states of hip and coordinates at it, their variables, and the rows that join the phases."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -9,12 +8,10 @@ from casadi import DM, MX, SX, vertcat
 
 from nlp_gait.formulation import Constraint, InstantPoint, Point, Variable
 from nlp_gait.formulation.assembly import make_variables
-from nlp_gait.gaits.biped.body import Body, Coordinate, Support
+from nlp_gait.gaits.biped.body import Body, Coordinate
 from nlp_gait.gaits.biped.bounds import make_hip_variables
 from nlp_gait.gaits.biped.limits import make_rows
-from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Samples
-from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 SWITCHES = ("lift_off", "touch_down")
 # Ranges of the hip's place ahead of the left foot as shares of a leg's length: generous, so that reach and balance decide. NAO's
@@ -33,45 +30,18 @@ class SwitchState(NamedTuple):
     angle_rates: SX
 
 
-@dataclass(frozen=True, kw_only=True)
-class Switch:
-    """A switch to a phase from the one before it, at which positions and rates are continuous and torques may jump.
+def limit_torque_jump(
+    switch: str, body: Body, point: Point, before: Samples, after: Samples, *, mirrored: bool = False
+) -> tuple[Constraint, dict[str, MX]]:
+    """Return the row that limits the jumps of torques at a switch, and an index, the largest one [Nm].
 
-    A switch with other laws overrides what it changes, see ``impact.py``; ``walking.py`` lists those of a cycle's touch-down.
+    Positions and rates are continuous. With ``mirrored`` the mirror image of the phase follows, as after the last one of a cycle.
     """
-
-    name: str
-    mirrored: bool = False  # the mirror image of the phase follows, as after the last one of a cycle
-
-    def make_variables(self, body: Body) -> list[Variable]:
-        """Return the variables that it adds to those of the states."""
-        return []
-
-    def read_landing_speed(self, point: InstantPoint) -> SX | float:
-        """Return the forward velocity at which the swinging foot lands [m/s]."""
-        return 0.0
-
-    def change_state(self, body: Body, point: InstantPoint, before: SwitchState) -> SwitchState:
-        """Return the state after it from the one before it."""
-        return before
-
-    def change_start(self, start: Mapping[str, float], parameters: Mapping[str, float]) -> Mapping[str, float]:
-        """Return a start point with other values of the variables that it adds."""
-        return start
-
-    def join(
-        self, phases: Mapping[Support, Phase], point: Point, before: Samples, after: Samples, ops: Nonsmooth
-    ) -> tuple[list[Constraint], dict[str, MX]]:
-        """Return the rows that join two phases, here those that limit the torques' jumps, and indexes, their largest [Nm]."""
-        body, limit = phases[Support.SINGLE].body, point[TORQUE_JUMP]
-        images, signs = body.mirror
-        first = DM(signs) * after.torque[images, 0] if self.mirrored else after.torque[:, 0]
-        jump, size = first - before.torque[:, -1], body.torque_scale
-        rows = make_rows(f"{self.name}_torque_jump", "Nm", jump, -limit, limit, body.joints, "once", size)
-        return [rows], {f"{self.name}_torque_jump_Nm": ca.mmax(ca.fabs(jump))}
-
-
-SOFT_LANDING = Switch(name="touch_down")
+    images, signs = body.mirror
+    first = DM(signs) * after.torque[images, 0] if mirrored else after.torque[:, 0]
+    jump, limit, name = first - before.torque[:, -1], point[TORQUE_JUMP], f"{switch}_torque_jump"
+    row = make_rows(name, "Nm", jump, -limit, limit, body.joints, "once", body.torque_scale)
+    return row, {f"{name}_Nm": ca.mmax(ca.fabs(jump))}
 
 
 def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
@@ -99,12 +69,7 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
 
 def read_state(point: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> SwitchState:
     """State of the variables whose names contain ``name``."""
-    velocity, rates = read_rates(point, name, coordinates)
-    hip = vertcat(*(point[f"hip_{axis}_{name}_m"] for axis in "xyz"))
-    return SwitchState(hip, velocity, vertcat(*(point[f"{c.name}_{name}_rad"] for c in coordinates)), rates)
-
-
-def read_rates(point: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> tuple[SX, SX]:
-    """Return velocity of the hip (3,) [m/s] and rates of all coordinates (k,) [rad/s] at the state of a name."""
     velocity = vertcat(*(point[f"hip_v{axis}_{name}_m_s"] for axis in "xyz"))
-    return velocity, vertcat(*(point[f"{c.rate}_{name}_rad_s"] for c in coordinates))
+    hip = vertcat(*(point[f"hip_{axis}_{name}_m"] for axis in "xyz"))
+    rates = vertcat(*(point[f"{c.rate}_{name}_rad_s"] for c in coordinates))
+    return SwitchState(hip, velocity, vertcat(*(point[f"{c.name}_{name}_rad"] for c in coordinates)), rates)

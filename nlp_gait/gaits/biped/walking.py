@@ -1,12 +1,6 @@
-"""Options of cycles and of whole walks, each declared and explained once, and how the problems are made of them.
+"""Options of cycles and of whole walks, each declared and explained once, and how the problems are made of them."""
 
-To add a joint between a cycle's phases, write a ``Switch`` (``impact.py`` is one) and add its option here: a name in ``Landing``,
-the object in ``LANDINGS``, and words to the attribute ``landing``. Both families of problems then have it.
-"""
-
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
@@ -14,15 +8,10 @@ from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.cycle import CycleObjective, make_cycle_problem, make_walking_cycle
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.footholds import parse_footholds
-from nlp_gait.gaits.biped.impact import Impact
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase_problem import make_goal
 from nlp_gait.gaits.biped.problems import LoadOptions, SampleOptions
-from nlp_gait.gaits.biped.switch import SOFT_LANDING, Switch
 from nlp_gait.gaits.biped.walk import plan_footstep_walk, plan_straight_walk
-
-Landing = Literal["soft", "inelastic"]
-LANDINGS: Mapping[Landing, Switch] = {"soft": SOFT_LANDING, "inelastic": Impact(name="touch_down")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,12 +21,9 @@ class CycleOptions(SampleOptions, LoadOptions):
     Attributes:
         objective: what is minimised: energy per metre, which leaves the speed free; or power, or torque, the mean of the sum of
             squared torques, at the speed ``speed_m_s``, a parameter: the step length is then speed times the time of the cycle
-        landing: of the swinging foot: soft, at rest; or inelastic, an impact at touch-down after which all joints continue with
-            other rates, see ``gaits.biped.impact``
     """
 
     objective: CycleObjective = "energy-per-metre"
-    landing: Landing = "soft"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +53,6 @@ def plan_cycle(body: Body, options: CycleOptions) -> GaitProblem:
         options.make_grid(),
         goal,
         at_given_speed=options.objective != "energy-per-metre",
-        touch_down=LANDINGS[options.landing],
     )
     return make_cycle_problem(cycle)
 
