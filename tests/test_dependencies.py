@@ -183,7 +183,7 @@ def test_importing_costs_only_what_is_needed(statement: str, unwanted: str) -> N
 
 # Modules that write without the functions of nlp_gait.files, into a temporary file of theirs or where nothing is kept.
 ALLOWED = (
-    "files processes backends/kernel/compiler export/formats simulation/video proofs/branch_and_bound study/pack "
+    "files processes backends/kernel/compiler export/formats proofs/branch_and_bound study/pack "
     "drawing/figures drawing/notebook_figure"
 )
 WRITING = re.compile(

@@ -14,12 +14,11 @@ from typer import Argument, Option
 from compare.analysis.units import format_millimetres, with_unit
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
 from compare.cli.options import Code, name_all, parse_numbers
-from compare.cli.printing import Output, Rows, show_progress
+from compare.cli.printing import Output, Rows
 from compare.judge import find_faults
 from compare.study.record import load_result_or_record
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
-from nlp_gait.simulation.video import Frame, check_frames, check_video_path, write_video
 
 if TYPE_CHECKING:
     from nlp_gait.formulation import Signals
@@ -93,7 +92,6 @@ def simulate(
     steps: Annotated[int | None, Option(min=1, max=1000)] = None,
     out: Annotated[Path | None, OUTPUT] = None,
     page: Annotated[Path | None, Option(metavar="FILE.html"), OUTPUT_FILE] = None,
-    video: Annotated[Path | None, OUTPUT_FILE] = None,
     world: ConditionOptions,
     drive_options: DriveOptions,
 ) -> Output:
@@ -114,12 +112,10 @@ def simulate(
     from nlp_gait.simulation.engine import load_mujoco
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
-    from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, list_frames, make_skeleton
-    from nlp_gait.simulation.simulate import SETTLE_TIME, prepare, simulate_plan
+    from nlp_gait.simulation.replay import make_skeleton
+    from nlp_gait.simulation.simulate import prepare, simulate_plan
 
-    load_mujoco(pictures=video is not None)
-    if video is not None:
-        check_video_path(video)
+    load_mujoco()
     folder = None if out is None else make_writable_folder(out)
     name_all(code)
     conditions = world.make()
@@ -128,17 +124,13 @@ def simulate(
         plan = make_plan(gait, steps)
         drive = drive_options.make(plan)
         faults = find_faults(gait, result)
-    if video is not None:
-        check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
     trace = simulate_plan(plan, conditions, drive)
-    written = [path for path in (page, video) if path is not None]
+    written = [] if page is None else [page]
     data, parts = _report(plan, trace, drive)
     data["faults"], parts = faults, [*faults, *parts]
     model, _ = prepare(plan, conditions, drive)
     if page is not None:
         _write_page(page, make_skeleton(plan, trace, model, gait.problem.title), trace)
-    if video is not None:
-        write_video(video, _show_pictures(draw_pictures(plan, trace, model), len(list_frames(trace))), FRAMES_PER_S)
     if folder is not None:
         xml = make_plan_model(plan, drive, conditions.friction, conditions.bumps)
         written += _write_report(folder, data, xml, trace.signals(plan.joints))
@@ -189,13 +181,6 @@ def _report(plan: Plan, trace: Simulation, drive: Drive) -> tuple[dict[str, Any]
             for hit in climb.riser_hits
         ]
     return data, parts
-
-
-def _show_pictures(pictures: Iterator[Frame], count: int) -> Iterator[Frame]:
-    with show_progress("frames", count) as advance:
-        for picture in pictures:
-            yield picture
-            advance("")
 
 
 def _describe(report: Measurements, mode: str) -> Iterator[str | Rows]:

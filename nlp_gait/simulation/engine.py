@@ -1,7 +1,6 @@
 """The engine: import of MuJoCo, and indices in its arrays."""
 
 import os
-import sys
 from types import ModuleType
 from typing import Any
 
@@ -12,17 +11,11 @@ from nlp_gait.formulation import Array
 from nlp_gait.simulation.plan import SIDES, Plan
 
 DRIVER = "MUJOCO_GL"  # environment variable with MuJoCo's graphics driver, read when it is imported
-DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 LEAST_LOAD = 1.0  # [N]; below this total load there is no centre of pressure
 
 
-def load_mujoco(*, pictures: bool = False) -> ModuleType:
-    """Import the engine; with pictures, it will draw: without a display and without another choice, through EGL.
-
-    Raises MissingExtraError, or OutputError if it does not load with the graphics driver ``MUJOCO_GL``.
-    """
-    if pictures and sys.platform == "linux" and not any(os.environ.get(name) for name in DISPLAYS):
-        os.environ.setdefault(DRIVER, "egl")
+def load_mujoco() -> ModuleType:
+    """Import the engine; raises MissingExtraError, or OutputError if it does not load with the graphics driver ``MUJOCO_GL``."""
     try:
         import mujoco as module
     except ImportError as error:

@@ -1,31 +1,21 @@
-"""Simulations to look at: a skeleton for pages, and pictures by MuJoCo's renderer."""
+"""Simulations to look at: the robot as a skeleton."""
 
-import math
-import warnings
-from collections.abc import Iterator
-from contextlib import closing
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import OutputError
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import TRUNK, Limb, Skeleton, Sole, Tread
-from nlp_gait.interrupts import delay_interrupts
 from nlp_gait.simulation.engine import LEAST_LOAD, load_mujoco
 from nlp_gait.simulation.measurements import average_pressure
 from nlp_gait.simulation.mjcf import TIME_STEP, find_sides, make_plan_shapes
 from nlp_gait.simulation.plan import SIDES, Plan
 from nlp_gait.simulation.shapes import Capsule
 from nlp_gait.simulation.simulate import Simulation
-from nlp_gait.simulation.video import Frame
 
 FRAMES_PER_S = 25.0
-SIZE = (960, 540)  # of pictures [pixels]
 PRESSURE_WINDOW_S = 0.02  # over which the centre of pressure is averaged
-AZIMUTH, ELEVATION = 125.0, -12.0  # of the camera [degrees]
-SEEN = 1.5  # height that the camera shows, in heights of the robot
 
 Indices = np.ndarray[tuple[int], np.dtype[np.intp]]
 
@@ -91,35 +81,3 @@ def _outline_ground(treads: tuple[Tread, ...], first: float, last: float) -> Arr
     edges = [first, *(tread.edge_m for tread in treads), max([last, *(tread.edge_m for tread in treads)])]
     corners = [(x, z) for (start, end), z in zip(pairwise(edges), heights, strict=True) for x in (start, end)]
     return np.array(corners)
-
-
-def draw_pictures(plan: Plan, simulation: Simulation, model: Any) -> Iterator[Frame]:
-    """Yield pictures of a simulation, by the engine's model; raises OutputError if there is no OpenGL to draw with."""
-    engine, (width, height) = load_mujoco(pictures=True), SIZE
-    model.vis.global_.offwidth, model.vis.global_.offheight = width, height
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the error below has the reason
-            renderer = engine.Renderer(model, height, width)
-    except Exception as error:  # any error of the graphics driver
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise OutputError(
-            f"a video needs OpenGL ({reason}); set MUJOCO_GL=egl or osmesa if installed, or write a page by --page FILE.html"
-        ) from error
-    data, camera, torso = engine.MjData(model), engine.MjvCamera(), model.body(plan.robot.root).id
-    camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
-    with closing(renderer):
-        for k, state in enumerate(simulation.states[list_frames(simulation)]):
-            with delay_interrupts():  # an interrupt inside the graphics driver would break it
-                data.qpos[:] = state
-                engine.mj_forward(model, data)
-                if k == 0:
-                    moving = model.geom_bodyid > 0
-                    tall = float((data.geom_xpos[moving, 2] + model.geom_rbound[moving]).max())
-                    sight = math.tan(math.radians(float(model.vis.global_.fovy)) / 2)
-                    camera.distance = SEEN * tall / (2 * sight)
-                    down = data.xpos[torso, 2] - 0.45 * tall
-                camera.lookat[:] = data.xpos[torso] - (0.0, 0.0, down)
-                renderer.update_scene(data, camera)
-                picture: Frame = renderer.render()
-            yield picture

@@ -16,13 +16,11 @@ from nlp_gait.errors import OutputError
 from nlp_gait.export.formats import write_npz
 from nlp_gait.files import format_csv, replace_file, write_text
 from nlp_gait.formulation import Signals
-from nlp_gait.simulation.video import write_video
 
 SIGNALS = Signals(joints=("a",), arrays={"q": np.zeros((2, 1))}, columns={})
 WRITERS: dict[str, Callable[[Path], object]] = {
     ".txt": lambda path: write_text(path, "new"),
     ".npz": lambda path: write_npz(path, SIGNALS),
-    ".gif": lambda path: write_video(path, [np.zeros((8, 8, 3), dtype=np.uint8)] * 2, 10.0),
     ".png": lambda path: save_figure(Figure(figsize=(1, 1)), path),
 }
 

@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 
-from nlp_gait.errors import OutputError
-
 pytest.importorskip("mujoco")
 
 from nlp_gait.simulation.drive import Drive  # noqa: E402
-from nlp_gait.simulation.engine import load_mujoco  # noqa: E402
 from nlp_gait.simulation.plan import make_plan  # noqa: E402
-from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, list_frames, make_skeleton  # noqa: E402
+from nlp_gait.simulation.replay import FRAMES_PER_S, list_frames, make_skeleton  # noqa: E402
 from nlp_gait.simulation.simulate import Conditions, prepare, simulate_plan  # noqa: E402
 
 
@@ -44,12 +41,3 @@ def test_the_skeleton_is_where_the_engine_has_the_robot(simulated):
     assert np.abs(skeleton.com[-1, :2] - skeleton.zmp[-1, :2]).max() < 0.005  # at rest
     assert (skeleton.margin()[5:] > 0.0).all()
     np.testing.assert_array_equal(skeleton.ground[:, 1], 0.0)
-
-
-def test_without_opengl_the_error_names_the_page(simulated, monkeypatch):
-    def refuse(*_):
-        raise RuntimeError("no context")
-
-    monkeypatch.setattr(load_mujoco(), "Renderer", refuse)
-    with pytest.raises(OutputError, match=r"a video needs OpenGL \(no context\).* or write a page by --page FILE.html"):
-        next(draw_pictures(*simulated))

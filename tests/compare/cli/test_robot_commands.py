@@ -5,9 +5,8 @@ import sys
 
 import numpy as np
 import pytest
-from PIL import Image
 
-from tests.compare.cli.calls import is_one_sentence, nlp_gait, one_sentence, process
+from tests.compare.cli.calls import nlp_gait, one_sentence
 from tests.compare.records import DSP_X
 
 X = {**DSP_X, "double_support_time_s": 2}  # slow enough for another robot
@@ -73,20 +72,3 @@ def test_export_writes_a_page(gait):
     for force in ([], ["--force"]):
         nlp_gait("export", gait, "--to", "html", *force)
     assert ">right leg</text>" in gait.with_suffix(".html").read_text()
-
-
-def test_a_film_is_made_without_a_display(gait, tmp_path):
-    """In a process of its own, for the graphics driver is chosen when the engine is imported; without one a sentence says so."""
-    film = tmp_path / "film.gif"
-    gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.05}}))
-    done = process("simulate", gait, "--video", film)
-    if "a video needs OpenGL" in done.stderr or "MuJoCo does not load" in done.stderr:
-        assert done.returncode == 1 and is_one_sentence(done.stderr) and not film.exists()
-        return
-    assert done.returncode == 0, done.stderr
-    assert f"wrote {film}" in done.stdout.replace("\n", "")
-    with Image.open(film) as image:
-        assert image.size == (960, 540) and image.info["duration"] == 40
-        colours = np.array(image.convert("RGB")).astype(int)
-    for side in (colours[:, :, 2] - colours[:, :, 0], colours[:, :, 0] - colours[:, :, 2]):
-        assert (side > 90).sum() > 500  # blue and orange legs
