@@ -105,13 +105,12 @@ def find_faults(result: Result, path: Path) -> list[str]:
         f"{'-inf' if row.lower is None else f'{row.lower:.4g}'} to {'inf' if row.upper is None else f'{row.upper:.4g}'}"
         for row in sorted(rows, key=lambda row: row.name not in of_variables)[:SHOWN]
     ]
-    more = f"; and {len(rows) - SHOWN} more" if len(rows) > SHOWN else ""
-    sentences = [f"The gait is not feasible; violated: {'; '.join(worst)}{more}"] if rows else []
+    violated = "; ".join([*worst, *([f"and {len(rows) - SHOWN} more"] if len(rows) > SHOWN else [])])
+    sentences = [f"The gait is not feasible; violated: {violated}"] if rows else []
     value = problem.objective.sign * values.cost
     if not math.isfinite(value):
-        raise InputError(
-            f"result {str(path)!r}: {problem.objective.name} is {value} at this x; {'; '.join(worst)}{more}"
-        )
+        reason = f"result {str(path)!r}: {problem.objective.name} is {value} at this x"
+        raise InputError("; ".join(filter(None, (reason, violated))))
     if isinstance(stated, int | float) and not abs(stated - value) <= SLIGHT * abs(value):
         unit = problem.objective.unit
         sentences.append(f"The file says {problem.objective.name} {stated:.6g} {unit}, and it is {value:.6g} {unit}")

@@ -9,6 +9,7 @@ import errno
 import functools
 import inspect
 import io
+import itertools
 import math
 import os
 import sys
@@ -117,11 +118,19 @@ def _check_values(context: typer.Context, given: Mapping[str, Any]) -> None:
         source = context.get_parameter_source(name)
         texts = value if isinstance(value, (list, tuple)) else [value]
         is_empty = any(isinstance(text, str) and not text.strip() for text in texts)
-        # An empty path and the current folder are the same once they are parsed.
-        is_empty |= value == Path() and any(argument == "" or argument.endswith("=") for argument in sys.argv)
-        if is_empty and source is not None and source.name == "COMMANDLINE":
-            option = next(parameter.opts[0] for parameter in context.command.params if parameter.name == name)
+        if source is None or source.name != "COMMANDLINE" or not (is_empty or value == Path()):
+            continue
+        option = next(parameter.opts[0] for parameter in context.command.params if parameter.name == name)
+        if is_empty or _is_typed_empty(option):
             raise InputError(f"{option} is an empty text; give a value, or leave it out (is a shell variable not set?)")
+
+
+def _is_typed_empty(option: str) -> bool:
+    """Return whether an option or argument was typed as an empty text: a path is then parsed as the current folder."""
+    words = sys.argv[1:]
+    if not option.startswith("-"):
+        return "" in words
+    return f"{option}=" in words or (option, "") in itertools.pairwise(words)
 
 
 @contextmanager

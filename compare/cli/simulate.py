@@ -113,7 +113,7 @@ def simulate(
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
     from nlp_gait.simulation.replay import make_skeleton
-    from nlp_gait.simulation.simulate import prepare, simulate_plan
+    from nlp_gait.simulation.simulate import SimulationRun
 
     load_mujoco()
     folder = None if out is None else make_writable_folder(out)
@@ -124,13 +124,13 @@ def simulate(
         plan = make_plan(gait, steps)
         drive = drive_options.make(plan)
         faults = find_faults(gait, result)
-    trace = simulate_plan(plan, conditions, drive)
+    run = SimulationRun(plan, conditions, drive)
+    trace = run.finish()
     written = [] if page is None else [page]
     data, parts = _report(plan, trace, drive)
     data["faults"], parts = faults, [*faults, *parts]
-    model, _ = prepare(plan, conditions, drive)
     if page is not None:
-        _write_page(page, make_skeleton(plan, trace, model, gait.problem.title), trace)
+        _write_page(page, make_skeleton(plan, trace, run.model, gait.problem.title), trace)
     if folder is not None:
         xml = make_plan_model(plan, drive, conditions.friction, conditions.bumps)
         written += _write_report(folder, data, xml, trace.signals(plan.joints))

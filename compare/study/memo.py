@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -73,11 +72,14 @@ def _call(function: Callable[[], Any], _: object = None) -> Any:
 
 
 def _read(path: Path | None) -> Mapping[str, Any]:
-    """Return the content of a file; empty if there is none, or it is damaged."""
-    with suppress(InputError):
-        content = read_json(path, "result") if path is not None and path.exists() else None
-        return content if isinstance(content, dict) else {}
-    return {}
+    """Return what a file contains; nothing if it does not exist or cannot be read."""
+    if path is None or not path.exists():
+        return {}
+    try:
+        content = read_json(path, "result")
+    except InputError:
+        return {}
+    return content if isinstance(content, dict) else {}
 
 
 def _store(path: Path | None, value: Any) -> Any:

@@ -97,7 +97,7 @@ def verify_study(
     records = [record for _, record in read if isinstance(record, RunRecord)]
     damaged = [(path, error) for path, error in read if isinstance(error, InputError)]
     rows = [Difference(path.relative_to(folder).as_posix(), "differs", str(error)) for path, error in damaged]
-    rows += _list_missing(folder, records)
+    rows += _check_records(folder, records)
     repeated, evaluated = list[tuple[RunRecord, Run]](), 0
     for group in group_by(records, lambda record: hash_json(record.inputs.problem)).values():
         try:
@@ -127,7 +127,7 @@ def _fold(rows: Sequence[Difference]) -> list[Difference]:
     return sorted(folded, key=lambda row: row.kind == "not repeated")
 
 
-def _list_missing(folder: Path, records: Sequence[RunRecord]) -> Iterator[Difference]:
+def _check_records(folder: Path, records: Sequence[RunRecord]) -> Iterator[Difference]:
     """Yield planned runs without a record, records under another's name, and versions that are not this machine's."""
     for name in read_study_file(folder).runs:
         if not (folder / RECORDS / f"{name}.json").exists():
@@ -136,7 +136,7 @@ def _list_missing(folder: Path, records: Sequence[RunRecord]) -> Iterator[Differ
         problem, solver = record.inputs.problem["name"], record.inputs.solver
         for label, own, names in ((record.problem, problem, PROBLEMS), (record.solver, solver, list_solvers())):
             if label in names and label != own:
-                yield Difference(record.name, "differs", f"{label!r} is the name of another one; this is of {own!r}")
+                yield Difference(record.name, "differs", f"it is named {label!r}, but its inputs are those of {own!r}")
     here = list_versions()
     for name in ("nlp-gait", "casadi"):
         others = {str(record.versions.get(name, here[name])) for record in records} - {here[name]}

@@ -366,10 +366,10 @@ def _run_starts(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkS
             gait = solve(cycle, seed=k, workers=1)
             settings.progress(f"start {k + 1}, cycle: {gait.status}")
             x0 = start_from_cycle(problem, x0, gait.x, float(problem.options.get("stair_rise_m", 0.0)))
-            if k == 0 and settings.intervals is None and gait.converged:
-                problem = (
-                    choose_finer_grid(problem, x0, settings) or problem
-                )  # before a library for the coarse grid is built
+            if (
+                k == 0 and settings.intervals is None and gait.converged
+            ):  # before a library for the coarse grid is built
+                problem = choose_finer_grid(problem, x0, settings) or problem
         for barrier in BARRIERS:
             if barrier not in solvers:  # the second one is rarely needed
                 ipopt = IpoptSettings(few_rows=False, barrier=barrier)

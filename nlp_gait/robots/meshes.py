@@ -43,9 +43,8 @@ def find_mesh(address: str, robot_file: Path) -> Path | None:
         Path(folder) for name in FOLDER_VARIABLES for folder in os.environ.get(name, "").split(os.pathsep) if folder
     ]
     above = [*robot_file.absolute().parents, *listed, *(folder / "share" for folder in listed)]
-    inside = [
-        folder for folder in above if re.fullmatch(rf"{re.escape(path.parts[0])}(-.*)?", folder.name)
-    ]  # ZIP: -main
+    named = re.compile(rf"{re.escape(path.parts[0])}(-.*)?")  # GitHub's ZIP files append the branch: -main
+    inside = [folder for folder in above if named.fullmatch(folder.name)]
     candidates = [*(folder / path for folder in above), *(folder.joinpath(*path.parts[1:]) for folder in inside)]
     return next((file for file in candidates if os.path.isfile(file)), None)
 

@@ -56,7 +56,7 @@ def draw_figures(results: Mapping[str, Results]) -> list[Figure]:
     result = results[LITERAL]
     drawn = [draw_angles(number) for number in ANGLES]
     drawn += [draw_zmp(result, numbers, row) for numbers, row in ZMPS.items()]
-    return [*([draw_epochs(result)] if result.searched else []), *drawn, draw_trade_off(results)]
+    return [*([draw_epochs(result)] if result.is_searched else []), *drawn, draw_trade_off(results)]
 
 
 def draw_gait(result: Results) -> Figure:
@@ -129,7 +129,7 @@ def tabulate_third(results: Mapping[str, Results]) -> list[Table]:
     ours, values, variables = results[LITERAL], list[Mapping[str, Value]](), list[Mapping[str, Value]]()
     for row, best in zip(TABLE_3, ours.optima, strict=True):
         gaits = {f"gait, {name}": compute_f(row, F1MAX, **OPTIONS[name]) for name in (LITERAL, RAISED)}
-        ends = ours.list_ends(f"{row.weight:g}") if ours.searched else []
+        ends = ours.list_ends(f"{row.weight:g}") if ours.is_searched else []
         median = float(np.median(ends)) if ends else None
         values.append({"λ": row.weight, "print": row.f, **gaits, "GA, median": median, "optimum": best.objective})
         pairs: dict[str, Value] = {"λ": row.weight}

@@ -106,7 +106,7 @@ class Results:
         return OPTIONS[self.reading]
 
     @property
-    def searched(self) -> bool:
+    def is_searched(self) -> bool:
         """Whether there are runs of the GA."""
         return any(solver == "ga" for _, solver in self.runs)
 

@@ -36,10 +36,8 @@ RESTING_ARM_ANGLES = HELD_ARM_ANGLES | {
 
 # The axis about which each joint must turn.
 AXES = dict(zip(LEG_JOINTS, (FORWARD, TO_THE_LEFT, TO_THE_LEFT, TO_THE_LEFT, FORWARD), strict=True))
-CROSSING, BELOW = (
-    ("HipPitch", "AnkleRoll"),
-    ("KneePitch", "AnklePitch"),
-)  # the joint before each of these, or straight below it
+CROSSING = ("HipPitch", "AnkleRoll")  # joints whose axis crosses that of the joint before them
+BELOW = ("KneePitch", "AnklePitch")  # joints that are straight below the one before them
 
 # Published axes and origins are rounded: 1e-3 rad and 0.1 mm move a foot by less than the 4 mm by which margins reproduce.
 AXIS_TOLERANCE, ORIGIN_TOLERANCE_M = 1e-3, 1e-4

@@ -117,8 +117,8 @@ def test_runs_under_the_label_of_another_solver_or_problem_are_named(sound: Path
         [replace(record, solver="ga", run=k, problem=p) for k, p in enumerate(("walk12", "nao-ssp"))], tmp_path
     )
     text = describe(verify_study(tmp_path, share=0.0))
-    assert "'ga' is the name of another one; this is of 'pso'" in text
-    assert "'nao-ssp' is the name of another one; this is of 'walk12'" in text
+    assert "it is named 'ga', but its inputs are those of 'pso'" in text
+    assert "it is named 'nao-ssp', but its inputs are those of 'walk12'" in text
 
 
 PROGRAM = """
