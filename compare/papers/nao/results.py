@@ -153,9 +153,8 @@ def _make_start_tasks(effort: NaoEffort) -> Iterator[Run]:
 def _start_from_print(spec: ProblemSpec, phase: str, random: int) -> list[Run]:
     problem = spec.load()
     first = problem.by_name(np.clip(PRINTED_X[phase, "PSO"], problem.lower, problem.upper))
-    return make_start_tasks(
-        spec, random, first=[first], settings={"compiled": False}
-    )  # compiling takes longer than it saves
+    settings = {"compiled": False}  # compiling takes longer than it saves
+    return make_start_tasks(spec, random, first=[first], settings=settings)
 
 
 def compute(runner: Runner, effort: NaoEffort) -> dict[str, NaoResults]:
