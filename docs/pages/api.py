@@ -62,16 +62,16 @@ def names_of(door: str) -> tuple[str, ...]:
 def write(folder: Path) -> None:
     """Write an index and a page for each module."""
     pages: dict[str, str] = {}
-    described: dict[int, str] = {}
+    described: dict[tuple[int, str], str] = {}
     for door in DOORS:
         module = importlib.import_module(door)
         blocks = [_heading(door, "="), inspect.getdoc(module) or ""]
         blocks[1] = "\n".join(_escaped(blocks[1].splitlines()))
         for name in sorted(names_of(door), key=lambda name: ORDER.index(_kind(getattr(module, name)))):
             value = getattr(module, name)
-            key, full = id(value), f"{door}.{name}"
+            key, full = (id(value), name), f"{door}.{name}"
             blocks.append(_heading(name, "-"))
-            if key in described and _kind(value) != "data":
+            if key in described:
                 blocks.append(f"The same as :py:obj:`{described[key]}`.")
                 continue
             described[key] = full
