@@ -11,7 +11,7 @@ from nlp_gait.formulation import Array
 from nlp_gait.simulation.engine import LEAST_LOAD
 from nlp_gait.simulation.plan import SIDES, Plan
 
-MOST_CONTACTS, MOST_OF_FOOT = 128, 64  # points of contact that are measured, of the robot and of a foot's link
+MOST_ON_FLOOR, MOST_ON_OBSTACLES = 16, 64  # points of contact of a foot's link that are measured
 CONTACT_VALUES = 10  # of a point: whether it is one, its force in its own axes, place, and normal
 HEIGHT, UPWARD = 8, slice(12, 15)  # columns of the torso's height and of its upward axis
 STEEP = 0.7  # vertical part of a contact's normal, below which it is with a riser
@@ -26,39 +26,38 @@ class Readings(NamedTuple):
     torque: Array  # (T, J) of the drives [Nm]
     loads: Array  # (T, 2) normal forces on both feet, from all contacts with the ground [N]
     risers: Array  # (T, 2) of these, normal forces of steep faces [N]
-    pressure: Array  # (T, 2) centre of pressure of all contacts [m]; NaN in flight
+    pressure: Array  # (T, 2) centre of pressure of both feet [m]; NaN in flight
 
 
-def list_sensors(plan: Plan) -> Iterator[Xml.Element]:
-    """Yield the sensors of a plan's robot, whose values ``read_sensors`` takes."""
+def list_sensors(plan: Plan, bumps: bool) -> Iterator[Xml.Element]:
+    """Yield the sensors of a plan's robot, on a floor with bumps or without, whose values ``read_sensors`` takes."""
+    most = MOST_ON_OBSTACLES if bumps or plan.ground else MOST_ON_FLOOR
     for side in SIDES:
         yield Xml.Element("framepos", objtype="site", objname=side)
     for kind in ("framepos", "framexaxis", "framezaxis"):
         yield Xml.Element(kind, objtype="xbody", objname=plan.robot.root)
     for name in plan.joints:
         yield Xml.Element("actuatorfrc", actuator=name)
-    yield Xml.Element("contact", num=str(MOST_CONTACTS), data="found force pos normal")
     for _, link in _list_feet(plan):
-        yield Xml.Element("contact", body1=link, num=str(MOST_OF_FOOT), data="found force pos normal")
+        yield Xml.Element("contact", body1=link, num=str(most), data="found force pos normal")
 
 
 def read_sensors(plan: Plan, values: Any) -> Readings:
     """Return the values (T, S) of all sensors by quantity; raises InputError where more contacts touch than are measured."""
-    count, joints, feet = len(values), len(plan.joints), list(_list_feet(plan))
-    sizes = (6, 3, 3, 3, joints, MOST_CONTACTS * CONTACT_VALUES, *[MOST_OF_FOOT * CONTACT_VALUES] * len(feet))
-    soles, torso, forward, _, torque, *contacts = np.split(values, np.cumsum(sizes)[:-1], axis=1)
-    contacts = [touching.reshape(count, -1, CONTACT_VALUES) for touching in contacts]
-    if any((touching[:, 0, 0] > touching.shape[1]).any() for touching in contacts):
-        raise InputError(f"the robot touches the ground at more than {MOST_CONTACTS} points; use larger or fewer bumps")
+    count, feet = len(values), [side for side, _ in _list_feet(plan)]
+    soles, torso, forward, _, torque, found = np.split(values, np.cumsum([6, 3, 3, 3, len(plan.joints)]), axis=1)
+    contacts = found.reshape(count, len(feet), -1, CONTACT_VALUES)
+    if (contacts[:, :, 0, 0] > (most := contacts.shape[2])).any():
+        raise InputError(f"a foot touches the ground at more than {most} points; use larger or fewer bumps")
+    forces, places = contacts[..., 1], contacts[..., 4:6]
+    steep = forces * (np.abs(contacts[..., 9]) < STEEP)
     loads, risers = np.zeros((count, 2)), np.zeros((count, 2))
-    for (side, _), touching in zip(feet, contacts[1:], strict=True):
-        forces = touching[:, :, 1]
-        loads[:, side] += forces.sum(axis=1)
-        risers[:, side] += (forces * (np.abs(touching[:, :, 9]) < STEEP)).sum(axis=1)
-    forces, places = contacts[0][:, :, 1], contacts[0][:, :, 4:6]
-    total = forces.sum(axis=1, keepdims=True)
+    for i, side in enumerate(feet):
+        loads[:, side] += forces[:, i].sum(axis=1)
+        risers[:, side] += steep[:, i].sum(axis=1)
+    total = loads.sum(axis=1, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):
-        centre = np.einsum("tc,tcx->tx", forces, places) / total
+        centre = np.einsum("tfc,tfcx->tx", forces, places) / total
     pressure = np.where(total > LEAST_LOAD, centre, np.nan)
     return Readings(soles.reshape(count, 2, 3), torso, forward, torque, loads, risers, pressure)
 

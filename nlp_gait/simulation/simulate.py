@@ -256,7 +256,9 @@ def prepare(plan: Plan, conditions: Conditions, drive: Drive, model: Any = None)
     """Return the engine's model, or that of an earlier call, and its data, with the robot in its planned state at time zero."""
     engine = load_mujoco()
     if model is None:
-        xml = make_plan_model(plan, drive, conditions.friction, conditions.bumps, list_sensors(plan))
+        xml = make_plan_model(
+            plan, drive, conditions.friction, conditions.bumps, list_sensors(plan, conditions.bumps is not None)
+        )
         model = engine.MjModel.from_xml_string(xml)
         model.body_mass *= conditions.mass_factor
         model.body_inertia *= conditions.mass_factor

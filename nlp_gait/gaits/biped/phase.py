@@ -198,10 +198,12 @@ class Phase:
 
     def signals(self, point: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
-        histories = {quantity: _to_array(values) for quantity, values in self._evaluate_histories(point).items()}
         n = self.grid.parts + 1
+        phases = DM(np.linspace(0.0, 1.0, n)).T
+        evaluated = self._evaluate_stages(self._history_stages, point, phases)
+        histories = {quantity: _to_array(values) for quantity, values in evaluated.items()}
         arrays = {
-            "t": _to_array(point[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
+            "t": _to_array(point[self.duration] * phases)[:, 0],
             **{name: histories[quantity] for name, quantity in HISTORIES.items()},
             **{
                 f"{foot}_{half}": rows
@@ -305,18 +307,15 @@ class Phase:
         loads = ca.Function("loads", [*orders, given], [q.measure(self, now) for q in of_loads])
         return Stages(motion, loads, of_motion, of_loads)
 
-    def _evaluate_stages(self, stages: "Stages", point: NumericPoint) -> dict[Quantity, MX]:
+    def _evaluate_stages(self, stages: "Stages", point: Point, phases: DM | None = None) -> dict[Quantity, Any]:
         """Evaluate quantities at all samples; derivatives may be finite differences."""
-        q, qd, qdd, world, *of_motion = self._map(stages.motion, [point])
+        q, qd, qdd, world, *of_motion = self._map(stages.motion, [point], phases=phases)
         if self.derivatives != "analytic":
             qd, qdd = self._differences(q, point)
         rows = [self.body.joints.index(name) for name in self.moving]
         loads = stages.loads.map(self.grid.parts + 1).call([q[rows, :], qd[rows, :], qdd[rows, :], world])
         values = dict(zip(stages.of_motion, of_motion, strict=True)) | dict(zip(stages.of_loads, loads, strict=True))
         return values | dict(zip(ALL_JOINTS, (q, qd, qdd), strict=True))
-
-    def _evaluate_histories(self, point: NumericPoint) -> dict[Quantity, MX]:
-        return self._evaluate_stages(self._history_stages, point)
 
     @cached_property
     def _history_stages(self) -> "Stages":
