@@ -41,7 +41,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, lis
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{probe.getsockname()[1]}"
-    scheduler = dask(folder, "dask_scheduler", "--host", address, "--no-dashboard")
+    scheduler = dask(folder, "dask_scheduler", "--host", address, "--no-dashboard", "--idle-timeout", "2m")
     workers = [
         dask(folder, "dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
         for _ in range(2)
