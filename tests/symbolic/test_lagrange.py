@@ -5,13 +5,7 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.gaits.stairs.planar_biped import (
-    ENDS,
-    LINKS,
-    load_toe_foot_biped,
-    locate_points,
-    make_dynamics,
-)
+from nlp_gait.gaits.stairs.planar_biped import LINKS, load_toe_foot_biped, make_dynamics
 
 pinocchio = pytest.importorskip("pinocchio")
 
@@ -41,14 +35,6 @@ def dynamics() -> ca.Function:
 def states() -> list[tuple[np.ndarray, np.ndarray]]:
     rng = np.random.default_rng(0)
     return [(rng.uniform(-np.pi, np.pi, 9), rng.uniform(-5.0, 5.0, 9)) for _ in range(30)]
-
-
-def test_inertia_rate_less_twice_coriolis_is_skew(dynamics: ca.Function, states: list) -> None:
-    q, qd = SX.sym("q", 9), SX.sym("qd", 9)
-    M, C, _ = dynamics(q, qd)
-    excess = ca.reshape(ca.jtimes(ca.vec(M), q, qd), 9, 9) - 2 * C
-    function = ca.Function("excess", [q, qd], [excess + excess.T])
-    assert max(np.abs(np.array(function(*state))).max() for state in states) < 1e-12
 
 
 def test_torques_equal_pinocchio(dynamics: ca.Function, states: list) -> None:
@@ -93,12 +79,3 @@ def planar_model() -> tuple[object, np.ndarray]:
         if parent:
             matrix[row, LINKS.index(parent)] -= signs[parent]
     return model, matrix
-
-
-def test_upright_points() -> None:
-    down = np.pi / 2
-    found = locate_points(SX([down, down, down, down, down, 0, 0, 0, 0]), SX(2, 1))
-    expected = {"H": (0.0, 0.8), "K": (0.0, 0.4), "A": (0.0, 0.0), "U": (0.0, 1.1), "T": (0.17, 0.0), "T'": (0.17, 0.0)}
-    for name, place in expected.items():
-        assert np.array(ca.DM(found[name])).ravel() == pytest.approx(place, abs=1e-12)
-    assert {end for pair in ENDS.values() for end in pair} == set(found)

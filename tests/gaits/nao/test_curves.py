@@ -4,19 +4,16 @@ import json
 from pathlib import Path
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 
 from nlp_gait.formulation import Array, GaitProblem, load
-from nlp_gait.symbolic.trajectories import basis
 from tests.backends.toys import row_violations
 from tests.evaluation import evaluated
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))
 NAMES = ("nao-ssp", "nao-dsp")
 OWN = {"nao-ssp": 9, "nao-dsp": 8}
-CURVES = {"nao-ssp": 9, "nao-dsp": 7}
 # The same sums in another order.
 ROUNDING = 1e-12
 
@@ -44,23 +41,6 @@ def test_without_coefficients_the_motion_is_the_papers(name: str, order: str) ->
     problem = load(name, trajectory=order, samples_per_interval=1)
     rich, plain = evaluated(problem, padded(problem)), evaluated(load(name), golden(name)["x"])
     assert rich.indexes == pytest.approx(plain.indexes, rel=ROUNDING)
-
-
-def tabulate_basis(spans: int) -> Array:
-    """Values of the basis functions (n, m) at some phases."""
-    phase = ca.SX.sym("phase")
-    function = ca.Function("basis", [phase], [basis(spans, phase, 0)])
-    return np.array([function(s).full()[:, 0] for s in np.linspace(0.0, 1.0, 40)])
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_each_order_contains_the_one_before(name: str) -> None:
-    coarse, fine = (load(name, trajectory=order, samples_per_interval=2) for order in ("spline-2", "spline-4"))
-    coefficients = some(coarse)
-    rough, rich = (tabulate_basis(spans) for spans in (2, 4))
-    more = np.linalg.lstsq(rich, rough @ coefficients.reshape(CURVES[name], -1).T, rcond=None)[0].T.ravel()
-    same = [evaluated(problem, padded(problem, c)).indexes for problem, c in ((coarse, coefficients), (fine, more))]
-    assert same[0] == pytest.approx(same[1], rel=1e-9)
 
 
 @pytest.mark.parametrize("name", NAMES)
