@@ -51,16 +51,6 @@ def same(a: Result, b: Result) -> bool:
 
 
 @every_algorithm
-def test_points_stay_within_bounds(algorithm: Algorithm) -> None:
-    problem = Function(lambda X: (X.sum(axis=1), np.zeros(len(X))), [-1.0, 0.1, 1e-3], [1.0, 0.3, 1e3])
-
-    def callback(X: Array, f: Array, violation: Array) -> None:
-        assert ((problem.lower <= X) & (X <= problem.upper)).all()
-
-    minimize(problem, algorithm, evaluations=1500, callback=callback)
-
-
-@every_algorithm
 def test_a_run_uses_its_budget_and_repeats_with_its_seed(algorithm: Algorithm) -> None:
     problem = disc()
     result = minimize(problem, algorithm, evaluations=BUDGET, seed=3)

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from compare.study.run import ProblemSpec, Run, Stop
-from nlp_gait.backends.solvers.registry import make_solver
-from nlp_gait.errors import UnknownNameError
 from tests.compare.records import run_once
 
 SSP = ProblemSpec(name="nao-ssp")
@@ -25,8 +23,3 @@ def test_slsqp_keeps_its_best_point_within_the_budget() -> None:
     assert record.status == "evaluation budget used" and not record.reported_feasible
     assert record.counts["f"] <= 45 and set(record.x) == set(SSP.load().names)
     assert run_once(Run(problem=SSP, solver="slsqp", stop=Stop(time_limit_s=1e-9))).status == "time limit reached"
-
-
-def test_unknown_solvers_are_refused() -> None:
-    with pytest.raises(UnknownNameError, match="unknown NLP solver 'snop'"):
-        make_solver("snop")

@@ -55,14 +55,3 @@ def test_power_is_that_of_the_time_histories(name: str, features: str) -> None:
     else:
         heat = 0.025 * (torque**2).sum(axis=1)
     assert evaluated(problem, x).cost == pytest.approx(float(mean(driven.sum(axis=1) + heat)), rel=1e-9)
-
-
-def test_both_are_simulated_with_the_rotors_of_the_plan() -> None:
-    for name in ("nao-ssp", "nao-dsp", "nao-cycle"):
-        plain, heavy = load(name).display.simulation_model, load(name, motors="rotor").display.simulation_model
-        assert plain is not None and not any(joint.armature_kgm2 for joint in plain.robot.joints.values())
-        assert heavy is not None and heavy.robot.joint("LKneePitch").armature_kgm2 == pytest.approx(4.2e-7 * 130.85**2)
-        assert heavy.robot.joint("RAnkleRoll").armature_kgm2 == pytest.approx(4.2e-7 * 201.3**2)
-        assert heavy.robot.joint("LHipYawPitch").armature_kgm2 == pytest.approx(
-            4.2e-7 * 201.3**2 / 2
-        )  # one motor for two
