@@ -12,19 +12,14 @@ import nlp_gait
 from compare.judge import evaluate
 from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Over, Point, RowsOverTime
-from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import affine
 from nlp_gait.proofs.guarantee import guarantee
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
-from tests.proofs.soundness import feasible_gaits, find_contradictions
+from tests.proofs.soundness import best_x, feasible_gaits, find_contradictions
 
 SEED = 3
 PEAK = 0.8  # of the toy's row, at half the time
-
-
-def best(instance: str) -> np.ndarray:
-    return np.array(load_facts()[instance].best_x)
 
 
 def waving(limit: float, over: Over | None = "instant") -> GaitProblem:
@@ -99,11 +94,9 @@ def test_rows_that_say_nothing_of_time_are_named_as_sampled() -> None:
     assert found.satisfied and found.sampled == ("wave",) and "checked on samples only: wave" in str(found)
 
 
-@pytest.mark.parametrize(
-    ("name", "instance"), [pytest.param("nao-ssp", "ssp-v5", marks=pytest.mark.slow), ("walk12", "walk12-w015")]
-)
-def test_best_known_gaits_hold_at_all_times_and_random_ones_are_not_contradicted(name: str, instance: str) -> None:
-    problem, x = nlp_gait.load(name), best(instance)
+@pytest.mark.parametrize("name", [pytest.param("nao-ssp", marks=pytest.mark.slow), "walk12"])
+def test_best_known_gaits_hold_at_all_times_and_random_ones_are_not_contradicted(name: str) -> None:
+    problem, x = nlp_gait.load(name), best_x(name)
     assert guarantee(problem, x).satisfied
     gaits = [x, *feasible_gaits(problem, x, 2, np.random.default_rng(SEED))]
     against, satisfied = find_contradictions(problem, gaits, 1001)
@@ -111,7 +104,7 @@ def test_best_known_gaits_hold_at_all_times_and_random_ones_are_not_contradicted
 
 
 def test_a_stair_gait_that_breaks_a_limit_between_samples_breaks_it_by_what_the_grid_shows() -> None:
-    problem, x = nlp_gait.load("stairs-plan"), best("stairs-energy")
+    problem, x = nlp_gait.load("stairs-plan"), best_x("stairs-plan")
     judged = evaluate(problem, x)
     proven = judged.guaranteed
     assert judged.feasible and proven is not None
@@ -145,7 +138,7 @@ def test_a_row_without_bounds_on_the_way_is_open_and_no_number_hides_it() -> Non
 
 
 def test_finite_differences_are_sampled_by_definition() -> None:
-    found = guarantee(nlp_gait.load("nao-ssp", derivatives="finite-difference"), best("ssp-v5"))
+    found = guarantee(nlp_gait.load("nao-ssp", derivatives="finite-difference"), best_x("nao-ssp"))
     assert found.satisfied is None and "on samples only" in found.reason and found.word == "?"
 
 

@@ -5,8 +5,8 @@ import pytest
 
 import nlp_gait
 from metaheuristics import AntColony, minimize
-from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem
+from tests.evaluation import evaluated
 
 # Stiff gains follow the plan of case 2 within 0.05 rad.
 FOLLOWED_RAD = 0.05
@@ -26,17 +26,11 @@ def problem() -> GaitProblem:
     return nlp_gait.load("stairs-track")
 
 
-def values(problem: GaitProblem, x: list[float]) -> tuple[float, float, dict[str, float]]:
-    """Cost, violation and indexes."""
-    at = build_exact_model(problem).at(x, problem.p)
-    return at.cost, at.violation, at.indexes
-
-
 def test_stiff_gains_follow_the_plan(problem: GaitProblem) -> None:
-    _, violation, indexes = values(problem, [1000.0, 1000.0, 1.463])
-    assert violation == 0.0
-    assert indexes["largest_error_rad"] < FOLLOWED_RAD
-    assert indexes["zmp_margin_min_m"] > 0.0
+    found = evaluated(problem, [1000.0, 1000.0, 1.463])
+    assert found.violation == 0.0
+    assert found.indexes["largest_error_rad"] < FOLLOWED_RAD
+    assert found.indexes["zmp_margin_min_m"] > 0.0
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
@@ -53,15 +47,15 @@ def test_finite_at_every_gain(problem: GaitProblem, share: float) -> None:
 def test_the_zmp_limits_are_constraints(problem: GaitProblem) -> None:
     """At a torso pitch where the ZMP leaves the foot."""
     x = [100.0, 100.0, 1.6]
-    cost, violation, indexes = values(problem, x)
-    assert indexes["zmp_margin_min_m"] < -1e-3
-    assert violation > 0.0
+    found = evaluated(problem, x)
+    margin = found.indexes["zmp_margin_min_m"]
+    assert margin < -1e-3
+    assert found.violation > 0.0
     arrays = problem.signals(np.array(x)).arrays
     polygon = np.where(arrays["t"] < 0.7783, 0.17 - 0.254, 0.0)
     outside = np.maximum(polygon - arrays["zmp"], arrays["zmp"] - 0.17)
-    assert outside.max() == pytest.approx(-indexes["zmp_margin_min_m"])
-    worthless = values(problem.with_values(zmp_weight=0.0), x)[0]
-    assert worthless - 100.0 * indexes["zmp_margin_min_m"] == pytest.approx(cost)
+    assert outside.max() == pytest.approx(-margin)
+    assert evaluated(problem.with_values(zmp_weight=0.0), x).cost - 100.0 * margin == pytest.approx(found.cost)
 
 
 def test_joint_torques_and_angles_of_the_same_motion() -> None:
@@ -86,7 +80,7 @@ def test_a_held_hip_is_followed_by_soft_legs_without_compensation() -> None:
         nlp_gait.load("stairs-track", base=base, duration_s=0.3).with_values(gravity_compensation=0.0)
         for base in ("hip", "stance-foot")
     )
-    (_, _, soft), (_, _, fallen) = (values(problem, [43.0, 5.0, 1.59]) for problem in (held, standing))
+    soft, fallen = (evaluated(problem, [43.0, 5.0, 1.59]).indexes for problem in (held, standing))
     assert soft["largest_error_rad"] < 0.5 * fallen["largest_error_rad"]
     assert soft["peak_torque_Nm"] < 0.5 * fallen["peak_torque_Nm"]
 
@@ -118,7 +112,7 @@ def test_multiple_shooting_meets_the_ants() -> None:
 
 def test_the_network_in_place_of_the_closed_form(problem: GaitProblem) -> None:
     learned, x = nlp_gait.load("stairs-track", inverse_kinematics="network"), [100.0, 100.0, 1.45]
-    (cost, *_), (known, *_) = values(learned, x), values(problem, x)
+    cost, known = evaluated(learned, x).cost, evaluated(problem, x).cost
     assert 0.0 < abs(cost - known) < NETWORK_COST * known
     found, exact = (p.signals(np.array(x)).arrays for p in (learned, problem))
     error, rates = (np.abs(found[name] - exact[name]).max(axis=0) for name in ("q_desired", "qd_desired"))

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.walk12.walk12_model import ANKLE_HEIGHT_M, load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps
+from tests.evaluation import evaluated
 from tests.gaits.walk12 import walk12_oracle as oracle
 
 MOMENT_TOLERANCE = 1e-6  # [Nm]; the difference stencil alone is good to 1e-8
@@ -19,19 +18,13 @@ DEFAULT = nlp_gait.load("walk12")
 
 def random_gaits(count: int, seed: int) -> list[Any]:
     """Reachable gaits, all over the bounds."""
-    model, rng = build_exact_model(DEFAULT), np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     found: list[Any] = []
     while len(found) < count:
         x = rng.uniform(DEFAULT.lower, DEFAULT.upper)
-        if model.at(x, DEFAULT.p).violation == 0.0:
+        if evaluated(DEFAULT, x).violation == 0.0:
             found.append(x)
     return found
-
-
-def values(problem: GaitProblem, x: Any) -> tuple[float, float, dict[str, float]]:
-    """f, violation and indexes."""
-    at = build_exact_model(problem).at(x, problem.p)
-    return -at.cost, at.violation, at.indexes
 
 
 def test_angles_equal_the_printed_inverse_kinematics() -> None:
@@ -85,7 +78,7 @@ STRAIGHT = ([0.098, 0.0255, 0.1299, 0.0013], [0.0517346, 0.12883558, 0.03921078,
 def test_no_rule_but_simpsons_on_few_intervals_errs_where_legs_are_straight(x: list[float]) -> None:
     stable = {"lambda": 1.0}
     f = {
-        quadrature: values(nlp_gait.load("walk12", quadrature=quadrature).with_values(**stable), x)[0]
+        quadrature: evaluated(nlp_gait.load("walk12", quadrature=quadrature).with_values(**stable), x).cost
         for quadrature in ("gauss", "simpson", "runge-kutta")
     }
     assert f["gauss"] == pytest.approx(f["runge-kutta"], abs=2e-7)
@@ -104,7 +97,7 @@ def test_no_rule_but_simpsons_on_few_intervals_errs_where_legs_are_straight(x: l
 def test_f1_at_the_rows_of_table_4(step_time: float, x: list[float], per_step: float, per_second: float) -> None:
     for horizon, expected in (("step", per_step), ("1s", per_second)):
         problem = nlp_gait.load("walk12", intervals=400, horizon=horizon).with_values(step_time_s=step_time)
-        assert values(problem, x)[2]["f1_per_m2s"] == pytest.approx(expected, abs=0.6)
+        assert evaluated(problem, x).indexes["f1_per_m2s"] == pytest.approx(expected, abs=0.6)
 
 
 def test_an_ankle_above_the_ground_shifts_the_zmp_by_the_horizontal_inertia() -> None:
