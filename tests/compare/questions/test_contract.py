@@ -27,7 +27,8 @@ from tests.compare.cli.calls import as_json, nlp_gait
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 TIMES = ("time_s", "cpu_s", "run_time_s", "files")
-ARM = {"swing_height_m": 0.015, "hip_height_m": 0.31, "hip_vx_start_m_s": 0.0124, "hip_vx_end_m_s": 0.001}
+LEGS = {"hip_height_m": 0.31, "hip_vz_start_m_s": 0.007, "hip_vz_end_m_s": 0.0}
+LEGS |= {"hip_vx_start_m_s": 0.005, "hip_vx_end_m_s": 0.068}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,15 +55,11 @@ CASES = {
     ),
     "pareto": Case(
         make=lambda: Pareto(
-            problem=load("nao-ssp", intervals=4).fix(**ARM),
-            points=5,
-            starts=1,
-            searches={"NSGA2": (100,)},
-            runs=1,
+            problem=load("nao-dsp", intervals=2).fix(**LEGS), points=5, starts=1, searches={"NSGA2": (100,)}, runs=1
         ),
         rows="front",
-        line="pareto nao-ssp --set intervals=4 --points 5 --starts 1 --search NSGA2=100 --runs 1 "
-        + " ".join(f"--set {name}={value}" for name, value in ARM.items()),
+        line="pareto nao-dsp --set intervals=2 --points 5 --starts 1 --search NSGA2=100 --runs 1 "
+        + " ".join(f"--set {name}={value}" for name, value in LEGS.items()),
     ),
 }
 each_question = pytest.mark.parametrize("name", CASES)
