@@ -26,9 +26,10 @@ GENERATIONS, LEAST_POPULATION = 10, 4  # a population may be smaller than usual,
 HELD_OUT = (1001, 1002, 1003)  # seeds of floors on which no gait is tuned
 HELD_OUT_M = 0.001  # height of their bumps, for gaits that are tuned on a calm floor
 MODEL, TUNED, CONTINUED = "IPOPT", "IPOPT+limits", "IPOPT+CMA"
+NEARBY = 0.02  # first standard deviation of CMA from IPOPT's optimum, as a share of each variable's range
 CAPTION = (
     f"After {{}} in the engine; held out: three other floors. {MODEL}: the optimum of the model; {TUNED}: with limits tuned in "
-    f"the engine; {CONTINUED}: CMA from the optimum"
+    f"the engine; {CONTINUED}: CMA from the optimum with a first standard deviation of {100 * NEARBY:g} % of each range"
 )
 CURVES = "Least energy of a gait that does what it may, over simulations, by the score of the search"
 
@@ -129,7 +130,7 @@ class Tune(Question[list[TunedGait]]):
             rows.append(replace(best, simulations=len(tuned)))
             yield rows
         effort = {"simulations": self.simulations, "seed": self.seed}
-        rows.append(compute(CONTINUED, self._search, name="cma", first=optimum.x, **effort))
+        rows.append(compute(CONTINUED, self._search, name="cma", first=optimum.x, sigma=NEARBY, **effort))
         yield rows
         for name, run in itertools.product(self.algorithms, range(self.runs)):
             effort["seed"] = self.seed + run
@@ -141,11 +142,18 @@ class Tune(Question[list[TunedGait]]):
         return self._judge(solver, np.array(solution.best.x), limits=limits)
 
     def _search(
-        self, solver: str, *, name: str, first: Sequence[float] | None, simulations: int, seed: int
+        self,
+        solver: str,
+        *,
+        name: str,
+        first: Sequence[float] | None,
+        simulations: int,
+        seed: int,
+        **settings: float,
     ) -> TunedGait:
         objective = EngineObjective(self._arenas[:1])
         population = min(make_algorithm(name).population, max(LEAST_POPULATION, simulations // GENERATIONS))
-        algorithm = make_algorithm(name, population=population)
+        algorithm = make_algorithm(name, population=population, **settings)
         initial = None if first is None else np.clip(first, objective.lower, objective.upper)[None]
         result = minimize(objective, algorithm, evaluations=simulations, seed=seed, initial=initial)
         h = result.history
