@@ -9,7 +9,7 @@ This page can be downloaded as a notebook.
 
 import nlp_gait
 from compare.study.record import make_frame
-from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.run import ProblemSpec, plan_runs
 from compare.study.study import Study, run_study
 
 # %%
@@ -35,13 +35,8 @@ figure
 # %%
 # A study, and its runs as a data frame.
 
-algorithms = {"ipopt": Stop(), "pso": Stop(evaluations=2000)}
-tasks = [
-    Run(problem=ProblemSpec(name="nao-dsp"), solver=a, number=k, stop=s)
-    for a, s in algorithms.items()
-    for k in range(3)
-]
-study = Study(runs=tuple(tasks))
+solvers = [("", "ipopt"), ("", "pso")]
+study = Study(runs=plan_runs([ProblemSpec(name="nao-dsp")], solvers, runs=3, starts=3, evaluations=2000))
 study
 
 # %%

@@ -28,7 +28,6 @@ from metaheuristics.preparation import check_budget
 from metaheuristics.registry import (
     ADAPTERS,
     ALGORITHMS,
-    HANDLINGS,
     list_installed_algorithms,
     make_algorithm,
     make_handling,
@@ -48,7 +47,6 @@ __all__ = [
     "EpsilonLevel",
     "Flip",
     "GeneticAlgorithm",
-    "HANDLINGS",
     "History",
     "Interrupted",
     "ParticleSwarm",

@@ -39,12 +39,6 @@ ADAPTERS: Mapping[str, Callable[..., Algorithm]] = {
 }
 """Those of other packages, by the package's name and a colon: `pip install 'nlp-gait[algorithms]'` installs them."""
 
-HANDLINGS: Mapping[str, Callable[..., ConstraintHandling]] = {
-    "deb": Deb,
-    "penalty": StaticPenalty,
-    "epsilon": EpsilonLevel,
-}
-
 
 def make_algorithm(name: str, /, **settings: object) -> Algorithm:
     """Make an algorithm by name.
@@ -67,9 +61,16 @@ def list_installed_algorithms() -> tuple[str, ...]:
     return (*ALGORITHMS, *(name for name in ADAPTERS if is_installed(name.partition(":")[0])))
 
 
-def make_handling(name: str, /, **settings: object) -> ConstraintHandling:
-    """Make a constraint handling by its name in `HANDLINGS`; raises SearchError as `make_algorithm` does."""
-    return make_by_name("constraint handling", name, HANDLINGS, settings)
+def make_handling(text: str, /) -> ConstraintHandling:
+    """Make a constraint handling from `deb`, `epsilon` or `penalty=WEIGHT`; raises SearchError for another text."""
+    name, _, weight = text.partition("=") if isinstance(text, str) else ("", "", "")
+    try:
+        return (
+            StaticPenalty(weight=float(weight)) if name == "penalty" else {"deb": Deb, "epsilon": EpsilonLevel}[text]()
+        )
+    except (KeyError, TypeError, ValueError):
+        allowed = "deb, epsilon or penalty=WEIGHT, a number > 0; no weight suits every problem"
+        raise SearchError(f"constraint handling must be {allowed}, got {abbreviate(text)}") from None
 
 
 def make_by_name(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settings: Mapping[str, object]) -> T:

@@ -64,7 +64,7 @@ def main() -> None:
 
 def limit_time(task: Run) -> Run:
     """Return the task, with a time limit for gradient methods."""
-    return task if task.is_search else replace(task, stop=replace(task.stop, time_limit_s=GRADIENT_LIMIT_S))
+    return task if task.is_search else replace(task, time_limit_s=GRADIENT_LIMIT_S)
 
 
 def make_rows(records: Sequence[RunRecord]) -> list[BaselineRun]:

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 from compare.analysis.best_known import is_zero
 from compare.analysis.record_statistics import ECDF_TARGETS
 from compare.study.record import History, RunRecord, Times
-from compare.study.run import GRADIENT_SOLVERS, Handling, Inputs, ProblemSpec, Run, Stop, plan_runs
+from compare.study.run import EVALUATIONS, GRADIENT_SOLVERS, Inputs, ProblemSpec, Run, plan_runs
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError, format_value
 from nlp_gait.gaitbench.facts import Subset
@@ -23,7 +23,6 @@ from nlp_gait.gaitbench.generated import is_generated, make_id
 
 # Rules: the same runs, budget and seeds for all solvers.
 RUNS = 15
-EVALUATIONS = 10_000  # as in the papers: 50 candidates, 200 generations
 BASELINE = tuple("random pso ga aco aco-grid cma de pymoo:GA pymoo:DE pymoo:ISRES slsqp ipopt".split())
 DRAWN_RUNS = 3  # on each drawn instance
 TABLE = Path(__file__).with_name("baseline.csv.xz")
@@ -63,7 +62,7 @@ def plan_bench_runs(
 ) -> tuple[Run, ...]:
     """Return the runs of some solvers, each with its label or an empty text, on some instances; run k has the seed k."""
     problems, labelled = [ProblemSpec(name=id) for id in instances], [(label, name) for name, label in solvers.items()]
-    return plan_runs(problems, labelled, runs=runs, starts=runs, stop=Stop(evaluations=evaluations))
+    return plan_runs(problems, labelled, runs=runs, starts=runs, evaluations=evaluations)
 
 
 class BaselineRun(NamedTuple):
@@ -124,7 +123,7 @@ def make_record(row: BaselineRun) -> RunRecord:
         objective=problem.objective,
         solver=row.solver,
         seed=row.run,
-        handling=None if row.solver in GRADIENT_SOLVERS else Handling(),
+        handling="" if row.solver in GRADIENT_SOLVERS else "deb",
     )
     reference = get_reference(row.instance)
     unit = problem.objective.sign * (1.0 if is_zero(reference) else abs(reference))

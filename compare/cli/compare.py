@@ -15,26 +15,15 @@ from compare.cli.printing import Output, Rows, describe_command, say_error, show
 from compare.report import write_report
 from compare.study.import_runs import read_imported_records
 from compare.study.record import RunRecord
-from compare.study.run import GRADIENT_SOLVERS, IPOPT, Handling, Run, Stop, plan_runs
-from compare.study.study import Study, read_study_file, run_study, write_command
+from compare.study.run import GRADIENT_SOLVERS, IPOPT, Run, plan_runs
+from compare.study.study import Study, read_study_file, run_study
 from metaheuristics import list_installed_algorithms
 from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.errors import InputError
-from nlp_gait.files import make_writable_folder
 from nlp_gait.interrupts import Interrupted
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 ALGORITHMS, STARTS = "pso,ga,aco", 20
 ALL, ALL_GRADIENT = "all", (IPOPT, "slsqp")
-
-
-def parse_handling(text: str) -> Handling:
-    """Return a constraint handling; raises InputError unless a penalty has a weight."""
-    name, _, weight = text.partition("=")
-    if (name == "penalty") != bool(weight):
-        raise InputError("--handling penalty=WEIGHT has a weight, others none; no weight suits every problem")
-    settings = {"weight": options.parse_number("the weight", weight, "--handling")} if weight else {}
-    return Handling(name=name, settings=settings)
 
 
 def list_solver_names(algorithms: str, starts: int) -> list[str]:
@@ -78,8 +67,9 @@ def compare(
         [("", name) for name in list_solver_names(algorithms, starts)],
         runs=runs,
         starts=starts,
-        handling=parse_handling(handling),
-        stop=Stop(evaluations=evaluations, time_limit_s=time_limit),
+        handling=handling,
+        evaluations=evaluations,
+        time_limit_s=time_limit,
         seed=seed,
     )
     records = run_in_folder(planned, out, jobs, scheduler)
@@ -102,9 +92,8 @@ def compare(
 
 def run_in_folder(runs: tuple[Run, ...], out: Path, jobs: int | None, scheduler: str | None) -> list[RunRecord]:
     """Run a study in a folder, and return all records, also of earlier commands."""
-    study = Study(runs=runs, folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler)
-    study.check()  # before the folder names it
-    write_command(out, describe_command())
+    workers = jobs or available_cores()
+    study = Study(runs=runs, folder=out, jobs=workers, scheduler=scheduler, command=describe_command())
     gaps = LiveGaps()
     with show_progress("runs", len(study.runs), "building and compiling") as advance:
         try:

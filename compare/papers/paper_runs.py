@@ -13,7 +13,7 @@ import numpy as np
 from compare.report.document import Table, Value
 from compare.study.memo import Computation, Memo
 from compare.study.record import RunRecord, group_by
-from compare.study.run import IPOPT, ProblemSpec, Run, Stop
+from compare.study.run import IPOPT, ProblemSpec, Run
 from compare.study.study import RECORDS, Study, name_record, run_study
 from metaheuristics import minimize
 from metaheuristics.interface import Algorithm
@@ -102,9 +102,11 @@ def make_start_tasks(
 
 def make_search_tasks(problem: ProblemSpec, algorithms: Mapping[str, Algorithm], runs: int, budget: int) -> list[Run]:
     """Return tasks of searches by label; run k has seed k."""
-    stop = Stop(evaluations=budget)
     searches = product(algorithms.items(), range(runs))
-    return [Run(problem=problem, solver=solver, label=label, stop=stop, number=k) for (label, solver), k in searches]
+    return [
+        Run(problem=problem, solver=solver, label=label, evaluations=budget, number=k)
+        for (label, solver), k in searches
+    ]
 
 
 @cache

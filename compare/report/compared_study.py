@@ -18,7 +18,7 @@ from compare.drawing.figures import share_looks
 from compare.report.latex import format_latex_overview, format_latex_table
 from compare.report.study_report import write_report
 from compare.study.record import RunRecord, make_frame
-from compare.study.run import IPOPT, ProblemSpec, Stop, plan_runs
+from compare.study.run import IPOPT, ProblemSpec, plan_runs
 from compare.study.study import Study, StudyFile, run_study
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
@@ -110,6 +110,6 @@ def compare(
         given.insert(0, ("", IPOPT))
     listed = [problems] if isinstance(problems, (str, GaitProblem, ProblemSpec)) else problems
     specs = [problem if isinstance(problem, ProblemSpec) else ProblemSpec(name=problem) for problem in listed]
-    planned = plan_runs(specs, given, runs=runs, starts=starts, stop=Stop(evaluations=evaluations), seed=seed)
+    planned = plan_runs(specs, given, runs=runs, starts=starts, evaluations=evaluations, seed=seed)
     study = Study(runs=planned, folder=None if out is None else Path(out), jobs=jobs)
     return ComparedStudy(records=run_study(study))

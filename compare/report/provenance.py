@@ -43,7 +43,7 @@ def make_solver_table(records: Iterable[RunRecord]) -> Table:
 
 def describe_budget(record: RunRecord) -> str:
     """Return the number of evaluations that a run was allowed."""
-    budget = record.inputs.stop.get("evaluations")
+    budget = record.inputs.evaluations
     return f"{budget:,}".replace(",", "\u202f") if budget else "no limit"
 
 

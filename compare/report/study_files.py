@@ -55,7 +55,7 @@ def make_runs_table(comparisons: Sequence[Comparison]) -> TableRows:
     for comparison in comparisons:
         for solver in comparison.solvers:
             for record, curve, cost in zip(solver.records, solver.curves, solver.costs, strict=True):
-                budget = record.inputs.stop.get("evaluations")
+                budget = record.inputs.evaluations
                 measured = (len(record.x) or None, budget, comparison.gap(cost), curve.total_cost())
                 reached = (curve.cost_to_reach(target, axis) for axis in COSTS for target in TARGETS)
                 rows.append((*make_row(record), *measured, *reached))

@@ -110,12 +110,12 @@ class IsolatedRun:
         entries.append(entry)
         if x is not None:
             self.latest.x = x
-        if entry[0] >= self.run.stop.evaluations:
+        if entry[0] >= self.run.evaluations:
             self.deadline = min(self.deadline or math.inf, time.monotonic() + GRACE_S)
 
     @property
     def _allowed_s(self) -> float:
-        limit = self.run.stop.time_limit_s
+        limit = self.run.time_limit_s
         return math.inf if limit is None else limit + GRACE_S
 
     def is_late(self) -> bool:
@@ -126,16 +126,16 @@ class IsolatedRun:
 
     def conclude(self, result: Any) -> RunRecord:
         """Return the record of what the process returned, or of its error."""
-        stop, latest = self.run.stop, self.latest
+        latest, limit_s = self.latest, self.run.time_limit_s
         if isinstance(result, TimeoutError) and latest.entries:
             count, _, _, seconds = latest.entries[-1]
-            why = "evaluation budget used" if count >= stop.evaluations else "time limit reached"
+            why = "evaluation budget used" if count >= self.run.evaluations else "time limit reached"
             latest.status = f"{why}; the search did not return and was ended"
             result = replace(
                 latest, settings={"kind": "user code"}, time_s=Times(build=0.0, compile=0.0, solve=seconds)
             )
         elif isinstance(result, TimeoutError):
-            result = f"it evaluated nothing within its time limit of {stop.time_limit_s} s"
+            result = f"it evaluated nothing within its time limit of {limit_s} s"
         elif isinstance(result, BaseException):
             result = describe_error(result)
         if isinstance(result, str):
@@ -194,7 +194,7 @@ def make_failed(run: Run, inputs: Inputs, reason: str) -> RunRecord:
 def _search_reported(run: Run, inputs: Inputs, send: Send) -> SearchEnd | str:
     """Return the end of a search, or its error as text: the class of a user's error exists in this process only."""
     try:
-        return run_search(run, inputs, Reporter(send, run.stop.evaluations))
+        return run_search(run, inputs, Reporter(send, run.evaluations))
     except ChangedFileError:
         raise
     except BaseException as error:
@@ -210,15 +210,15 @@ def run_search(run: Run, inputs: Inputs, callback: Reporter | None = None) -> Se
     built = time.perf_counter()
     objective = compile_objective(problem, threads=1)  # runs take the processors
     compiled = time.perf_counter()
-    stop, folder = run.stop, os.getcwd()
+    folder = os.getcwd()
     try:
         result = minimize(
             objective,
             run.make_search(files),
-            evaluations=stop.evaluations,
+            evaluations=run.evaluations,
             seed=run.run_seed,
-            handling=make_handling(run.handling.name, **run.handling.settings),
-            stop=EarlyStop(time_limit_s=stop.time_limit_s),
+            handling=make_handling(run.handling),
+            stop=EarlyStop(time_limit_s=run.time_limit_s),
             callback=callback,
         )
     finally:

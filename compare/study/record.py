@@ -36,7 +36,7 @@ from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
 T = TypeVar("T")
 K = TypeVar("K")
 
-SCHEMA = 7
+SCHEMA = 8
 REMEDY = "delete it to have the run repeated"
 CALLS = tuple(kind.name for kind in fields(Evaluations))
 PACKAGES = ("casadi", "numpy", "scipy", "cma", "pymoo", "distributed")

@@ -46,6 +46,7 @@ LABEL = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9._+:() -]{0,62}[A-Za-z0-9._+:()-])
 PYMOO = "pymoo:"  # prefix of names that are not user code
 FUNCTION = "function"  # kind of a plain function in settings
 KEY_DIGITS = 16
+EVALUATIONS = 10_000  # as in the papers: 50 candidates, 200 generations
 
 
 def list_solvers() -> tuple[str, ...]:
@@ -108,27 +109,6 @@ def _load(name: str, options: tuple[tuple[str, Any], ...], contents: tuple[str, 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Handling:
-    """Constraint handling of searches: ``"deb"``, ``"penalty"`` or ``"epsilon"``, and its settings."""
-
-    name: str = "deb"
-    settings: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stop:
-    """When a run ends."""
-
-    evaluations: int = 10_000  #: budget of a search and of SLSQP; other NLP solvers end by themselves
-    time_limit_s: float | None = None  #: wall time [s]
-
-    @property
-    def limits(self) -> dict[str, int | float]:
-        """Criteria that are set, by name."""
-        return {name: value for name, value in asdict(self).items() if value is not None}
-
-
-@dataclass(frozen=True, kw_only=True)
 class Inputs:
     """Everything that the result of a run depends on."""
 
@@ -139,15 +119,16 @@ class Inputs:
     version: str = ""  #: of nlp-gait; empty for imported results
     settings: Mapping[str, Any] = field(default_factory=dict)  #: of the solver, that differ from its defaults
     code: str = ""  #: hash of the files of a user-defined solver
-    handling: Handling | None = None  #: of a search
-    stop: Mapping[str, Any] = field(default_factory=dict)  #: criteria that the solver heeds, as in ``Stop``
+    handling: str = ""  #: of constraints, in a search; empty for an NLP solver
+    evaluations: int | None = None  #: budget, if the solver heeds one
+    time_limit_s: float | None = None  #: wall time [s]
     start: Mapping[str, float] = field(default_factory=dict)  #: of an NLP solver; empty for a random point
     imported: str = ""  #: hash of imported values; empty for a run of ours
 
     @property
     def is_search(self) -> bool:
         """Whether the run ends with a search, so that its history is exact."""
-        return self.handling is not None
+        return bool(self.handling)
 
     @cached_property
     def key(self) -> str:
@@ -165,8 +146,9 @@ class Run:
     #: function (see ``metaheuristics.to_algorithm``)
     solver: str | Algorithm | Callable[..., object]
     settings: Mapping[str, Any] = field(default_factory=dict)  #: of the named solver, that differ from its defaults
-    handling: Handling = field(default_factory=Handling)  #: of constraints, in searches
-    stop: Stop = field(default_factory=Stop)  #: criteria
+    handling: str = "deb"  #: of constraints, in searches: deb, epsilon or penalty=WEIGHT
+    evaluations: int = EVALUATIONS  #: budget of a search and of SLSQP; other NLP solvers end by themselves
+    time_limit_s: float | None = None  #: wall time [s]
     seed: int = 0  #: of the study
     number: int = 0  #: its seed is ``seed + number``, so that equal runs of all solvers start alike
     label: str = ""  #: of the solver in the study; empty for its name
@@ -216,7 +198,7 @@ class Run:
     def make_solver(self) -> Solver:
         """Return the NLP solver with settings and the limits that it respects; InputError for what it does not allow."""
         setting_names = list_settings(str(self.solver))
-        limits = {"evaluations": self.stop.evaluations, "time_limit_s": self.stop.time_limit_s}
+        limits = {"evaluations": self.evaluations, "time_limit_s": self.time_limit_s}
         respected = {limit: value for limit, value in limits.items() if limit in setting_names and value is not None}
         return make_solver(str(self.solver), **{**respected, **self.settings})
 
@@ -226,7 +208,7 @@ def plan_runs(
 ) -> tuple[Run, ...]:
     """Return the runs of a study: on each problem ``starts`` of each NLP solver, and ``runs`` of each search.
 
-    ``solvers`` are labels, which may be empty, with solvers; ``common`` are further fields of all runs, such as ``stop``.
+    ``solvers`` are labels, which may be empty, with solvers; ``common`` are further fields of all runs, such as ``evaluations``.
     """
     pairs = list(solvers)
     return tuple(
@@ -254,9 +236,7 @@ def make_inputs(runs: Iterable[Run]) -> list[Inputs]:
 
 
 def _make_inputs(run: Run, problem: GaitProblem, identity: dict[str, Any], solver: Any, code: str) -> Inputs:
-    limits = run.stop.limits
-    if not run.is_search and "evaluations" not in list_settings(str(run.solver)):  # it ends by itself, or by the clock
-        limits = {key: value for key, value in limits.items() if key == "time_limit_s"}
+    has_budget = run.is_search or "evaluations" in list_settings(str(run.solver))
     return Inputs(
         problem=identity,
         objective=problem.objective,
@@ -265,8 +245,9 @@ def _make_inputs(run: Run, problem: GaitProblem, identity: dict[str, Any], solve
         seed=run.run_seed,
         version=__version__,
         code=code,
-        handling=run.handling if run.is_search else None,
-        stop=limits,
+        handling=run.handling if run.is_search else "",
+        evaluations=run.evaluations if has_budget else None,
+        time_limit_s=run.time_limit_s,
         start=dict(run.start),
     )
 
@@ -295,16 +276,16 @@ def check_run(run: Run) -> None:
         check_reference(str(run.solver), "algorithm")  # without running it
     elif isinstance(run.solver, str) and run.solver not in list_solvers():
         raise unknown("algorithm", run.solver, [*list_solvers(), *find_entry_points("algorithm")])
-    if run.stop.time_limit_s is not None and not run.stop.time_limit_s > 0.0:
-        raise InputError(f"time_limit_s must be > 0, got {run.stop.time_limit_s}")
+    if run.time_limit_s is not None and not run.time_limit_s > 0.0:
+        raise InputError(f"time_limit_s must be > 0, got {run.time_limit_s}")
     if run.run_seed > LARGEST_INTEGER:
         raise InputError(f"the seed {run.run_seed} of run {run.number} exceeds 64 bits")
     if not run.is_search:
         run.make_solver().check(problem)
     else:
-        make_handling(run.handling.name, **run.handling.settings)
+        make_handling(run.handling)
         if not run.is_user_code:
-            check_budget(run.make_search(), run.stop.evaluations)
+            check_budget(run.make_search(), run.evaluations)
     if run.start:
         if run.is_search:
             raise InputError(f"search {run.title!r} takes no start point; only NLP solvers do")

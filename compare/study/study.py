@@ -58,21 +58,18 @@ def read_study_file(folder: Path) -> StudyFile:
         return decode(StudyFile, raw)
 
 
-def write_command(folder: Path, command: str) -> None:
-    """Write the command of a study; raises InputError if its file is damaged, and OutputError."""
-    with lock_folder(folder):
-        file = replace(read_study_file(folder), command=command, date=format_now())
-        write_json(folder / FILE, asdict(file))
+def list_runs(folder: Path, names: Sequence[str], command: str = "") -> None:
+    """Make runs part of a study; they replace the runs of their problems and solvers, whose records stay as files.
 
-
-def list_runs(folder: Path, names: Sequence[str]) -> None:
-    """Make runs part of a study; they replace the runs of their problems and solvers, whose records stay as files."""
+    A command is written, too. Raises InputError if ``study.json`` is damaged, and OutputError.
+    """
     with lock_folder(folder):
         file = read_study_file(folder)
         solvers = {_name_solver(name) for name in names}
         kept = [name for name in file.runs if _name_solver(name) not in solvers]
-        if set(file.runs) != {*kept, *names}:
-            write_json(folder / FILE, asdict(replace(file, runs=(*kept, *dict.fromkeys(names)))))
+        if command or set(file.runs) != {*kept, *names}:
+            last = {"command": command, "date": format_now()} if command else {}
+            write_json(folder / FILE, asdict(replace(file, runs=(*kept, *dict.fromkeys(names)), **last)))
 
 
 def _name_solver(name: str) -> str:
@@ -152,6 +149,7 @@ class Study:
     folder: Path | None = None  #: where records are written; None writes none
     jobs: int = 1  #: worker processes; 1 runs all but user code by name in this process
     scheduler: str | None = None  #: address of a Dask scheduler to use instead of local processes
+    command: str = ""  #: that is written to the folder, for its report
 
     def __post_init__(self) -> None:
         """Validate the study."""
@@ -234,7 +232,7 @@ def _read_finished(study: Study, inputs: Sequence[Inputs]) -> dict[int, RunRecor
     paths = [study.folder / RECORDS / f"{name}.json" for name in names]
     for folder in {path.parent for path in paths}:
         make_writable_folder(folder)
-    list_runs(study.folder, names)
+    list_runs(study.folder, names, study.command)
     return {index: _read_named(path) for index, path in enumerate(paths) if path.exists()}
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from compare.study.pack import find_packed, list_problem_code, read_index
 from compare.study.record import RunRecord, group_by, list_versions
 from compare.study.references import SAME_VALUE
-from compare.study.run import Handling, ProblemSpec, Run, Stop, list_solvers
+from compare.study.run import EVALUATIONS, ProblemSpec, Run, list_solvers
 from compare.study.study import FILE, RECORDS, Study, read_each, read_study_file, run_study
 from nlp_gait.backends.exact import build_exact_model, describe_difference, hash_json, identify_problem
 from nlp_gait.backends.kernel.compiled import available_cores
@@ -195,7 +195,7 @@ def _make_run(folder: Path, record: RunRecord, spec: ProblemSpec, run_code: bool
         raise InputError("it was imported: its counts, history and seed are as reported")
     if not isinstance(solver, str):
         raise InputError("its solver was an object of Python, which has no name")
-    if inputs.stop.get("time_limit_s") is not None:
+    if inputs.time_limit_s is not None:
         raise InputError("it ended by the clock, or could have")
     if inputs.code:
         packed = find_packed(folder, [(solver, "algorithm", inputs.code)], run_code)
@@ -204,8 +204,8 @@ def _make_run(folder: Path, record: RunRecord, spec: ProblemSpec, run_code: bool
         problem=spec,
         solver=solver,
         settings=inputs.settings,
-        handling=inputs.handling or Handling(),
-        stop=decode(Stop, inputs.stop),
+        handling=inputs.handling or "deb",
+        evaluations=inputs.evaluations or EVALUATIONS,
         seed=record.seed - record.run,
         number=record.run,
         label=record.solver,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from compare.judge import evaluate
 from compare.study.perform import make_record
 from compare.study.record import History, RunRecord, Times, describe_evaluation
-from compare.study.run import Handling, Inputs, ProblemSpec, Run, Stop, make_inputs
+from compare.study.run import Inputs, ProblemSpec, Run, make_inputs
 from compare.study.study import Study, run_study
 from nlp_gait.formulation import Objective
 from nlp_gait.formulation.solution import ActiveConstraint
@@ -51,7 +51,7 @@ def record(
         objective=objective,
         solver=solver,
         seed=run,
-        handling=Handling() if search else None,
+        handling="deb" if search else "",
     )
     seconds = tuple(count * seconds_per_evaluation for count, _ in history)
     return RunRecord(
@@ -102,7 +102,7 @@ def judged(
     solve_s: float = 0.5,
 ) -> RunRecord:
     """A run of a search that ends at a point, as the judge finds it."""
-    planned = Run(problem=ProblemSpec(name=problem), solver=solver, number=run, stop=Stop(evaluations=evaluations))
+    planned = Run(problem=ProblemSpec(name=problem), solver=solver, number=run, evaluations=evaluations)
     found = describe_evaluation(evaluate(planned.problem.load(), x))
     best = found["objective"] if found["feasible"] else None
     return make_record(

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import nlp_gait
-from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.run import ProblemSpec, Run
 from compare.study.study import Study, read_records, run_study
 from nlp_gait.backends.kernel.compiler import FOLDER_VARIABLE
 from tests.compare.cli import calls
@@ -24,7 +24,7 @@ STUDIES, RUNS = 3, 6
 
 
 def make_run(evaluations: int, number: int, label: str = "") -> Run:
-    return Run(problem=WALK, solver="random", label=label, stop=Stop(evaluations=evaluations), number=number)
+    return Run(problem=WALK, solver="random", label=label, evaluations=evaluations, number=number)
 
 
 def list_offspring(parent: int) -> dict[int, str]:
@@ -90,7 +90,7 @@ def test_four_processes_of_one_study_that_are_killed_lose_nothing_and_the_same_c
 def test_durations_do_not_follow_the_clock_on_the_wall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     backwards = itertools.count(2e9, -3600.0)
     monkeypatch.setattr(time, "time", lambda: next(backwards))
-    runs = tuple(Run(problem=WALK, solver=name, stop=Stop(evaluations=300)) for name in ("pso", "slsqp", "ipopt"))
+    runs = tuple(Run(problem=WALK, solver=name, evaluations=300) for name in ("pso", "slsqp", "ipopt"))
     for record in run_study(Study(runs=runs, folder=tmp_path)):
         times = record.time_s
         assert min(times.build, times.compile, times.solve, *times.history) >= 0.0

@@ -66,9 +66,10 @@ def test_lookup_by_name(name: str) -> None:
             "unknown algorithm 'psoo'; did you mean 'pso'.*Known: pso, pso-constant, ga, ga-goswami",
         ),
         (make_algorithm, "pso", {"inertial": 1.0}, "'pso' has no setting 'inertial'; did you mean 'inertia'"),
-        (make_handling, "penalty", {}, "constraint handling 'penalty' needs a value for 'weight'"),
-        (make_handling, "deb", {"weight": 1.0}, "constraint handling 'deb' has no setting 'weight'"),
-        (make_handling, "epsilonn", {}, "unknown constraint handling 'epsilonn'; did you mean 'epsilon'"),
+        *(
+            (make_handling, text, {}, "penalty=WEIGHT, a number > 0")
+            for text in ("penalty", "penalty=x", "deb=1", "debb")
+        ),
     ],
 )
 def test_unknown_names_are_answered_with_near_ones(

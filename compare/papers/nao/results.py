@@ -26,7 +26,7 @@ from compare.papers.paper_runs import (
 )
 from compare.study.memo import Computation
 from compare.study.record import RunRecord
-from compare.study.run import IPOPT, Handling, ProblemSpec, Run
+from compare.study.run import IPOPT, ProblemSpec, Run
 from metaheuristics import GeneticAlgorithm
 from metaheuristics.algorithms.genetic import SimulatedBinary
 from metaheuristics.registry import make_algorithm
@@ -181,7 +181,7 @@ def _make_search_tasks(effort: NaoEffort) -> Iterator[Run]:
         yield from make_search_tasks(spec, main, effort.runs, effort.evaluations)
         yield from make_search_tasks(spec, others, effort.variant_runs, effort.evaluations)
         for task in make_search_tasks(spec, {"ga-penalty": main["ga"]}, effort.variant_runs, effort.evaluations):
-            yield replace(task, handling=Handling(name="penalty", settings={"weight": PENALTY_W}))
+            yield replace(task, handling=f"penalty={PENALTY_W}")
 
 
 def _make_computations(effort: NaoEffort) -> Iterator[tuple[str, Computation]]:

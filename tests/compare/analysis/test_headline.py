@@ -18,7 +18,7 @@ from compare.analysis.record_statistics import find_best_known
 from compare.report.study_report import write_better_points
 from compare.study.record import RunRecord
 from compare.study.references import Reference, find_reference
-from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.run import ProblemSpec, Run
 from compare.study.study import Study, run_study
 from nlp_gait.backends.exact import identify_problem
 from nlp_gait.formulation import Constraint
@@ -36,7 +36,7 @@ CERTIFIED = load_certificates()["walk12-lambda-0.4"].problem
 def runs() -> list[RunRecord]:
     """Two short runs of a search without IPOPT."""
     spec = ProblemSpec(name="walk12", options=CERTIFIED["options"], values=CERTIFIED["parameters"])
-    tasks = [Run(problem=spec, solver="pso", stop=Stop(evaluations=300), number=run) for run in range(2)]
+    tasks = [Run(problem=spec, solver="pso", evaluations=300, number=run) for run in range(2)]
     return run_study(Study(runs=tuple(tasks)))
 
 

@@ -14,7 +14,7 @@ from compare.report.document import Document
 from compare.report.latex import format_latex_table
 from compare.report.study_report import make_study_document
 from compare.study.record import RunRecord
-from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.run import ProblemSpec, Run
 from compare.study.study import Study, StudyFile, run_study
 
 EMPTY = Document(title="", parts=())
@@ -22,10 +22,10 @@ EMPTY = Document(title="", parts=())
 
 @pytest.fixture(scope="module")
 def records() -> list[RunRecord]:
-    problem, stop = ProblemSpec(name="walk12"), Stop(evaluations=1000)
+    problem = ProblemSpec(name="walk12")
     labels = {"pso": "pso", "random": "RD_1 50"}
     tasks = [
-        Run(problem=problem, solver=solver, stop=stop, number=run, label=labels[solver])
+        Run(problem=problem, solver=solver, evaluations=1000, number=run, label=labels[solver])
         for solver in labels
         for run in range(6)
     ]

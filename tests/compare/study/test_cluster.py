@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from compare.study.record import RunRecord
-from compare.study.run import ProblemSpec, Stop, plan_runs
+from compare.study.run import ProblemSpec, plan_runs
 from compare.study.study import Study, run_study
 from nlp_gait.errors import InputError, WorkerError
 from tests.compare.study.test_study import contents
@@ -21,7 +21,6 @@ need("distributed")
 
 WALK = ProblemSpec(name="walk12")
 SEARCHES = [("", "pso"), ("", "ga")]
-STOP = Stop(evaluations=200)
 
 
 def dask(folder: Path, *arguments: str) -> subprocess.Popen[bytes]:
@@ -74,7 +73,7 @@ def test_workers_find_user_code_and_killed_processes_lose_no_run(
     Path("own.py").write_text(OWN)
     Path("helper.py").write_text("def draw(rng, lower, upper):\n    return rng.uniform(lower, upper)\n")
     own = ("", "own.py:search")
-    runs = plan_runs([WALK], [*SEARCHES, ("", "ipopt"), own], runs=3, starts=3, stop=STOP)
+    runs = plan_runs([WALK], [*SEARCHES, ("", "ipopt"), own], runs=3, starts=3, evaluations=200)
     with Client(address, timeout="60s") as client:
         client.wait_for_workers(2, timeout=60)
     finished: list[RunRecord] = []
@@ -94,7 +93,7 @@ def test_workers_find_user_code_and_killed_processes_lose_no_run(
         scheduler.kill()
         finished.append(record)
 
-    more = plan_runs([WALK], [own], runs=30, starts=1, stop=Stop(evaluations=2000))
+    more = plan_runs([WALK], [own], runs=30, starts=1, evaluations=2000)
     with pytest.raises(WorkerError, match="failed: .*; finished runs are stored: rerun the same command to continue"):
         study = Study(runs=more, folder=tmp_path / "lost", scheduler=address)
         run_study(study, progress=kill_the_scheduler)
@@ -105,5 +104,5 @@ def test_workers_find_user_code_and_killed_processes_lose_no_run(
 def test_no_scheduler_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.study.study.CONNECT_TIMEOUT", "1s")
     with pytest.raises(InputError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
-        runs = plan_runs([WALK], SEARCHES, runs=1, starts=1, stop=STOP)
+        runs = plan_runs([WALK], SEARCHES, runs=1, starts=1, evaluations=200)
         run_study(Study(runs=runs, folder=tmp_path, scheduler="tcp://127.0.0.1:9"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.run import ProblemSpec, Run
 from tests.compare.records import run_once
 
 SSP = ProblemSpec(name="nao-ssp")
@@ -19,7 +19,7 @@ def test_slsqp_finds_the_optimum_and_counts_every_finite_difference() -> None:
 
 
 def test_slsqp_keeps_its_best_point_within_the_budget() -> None:
-    record = run_once(Run(problem=SSP, solver="slsqp", stop=Stop(evaluations=45)))
+    record = run_once(Run(problem=SSP, solver="slsqp", evaluations=45))
     assert record.status == "evaluation budget used" and not record.reported_feasible
     assert record.counts["f"] <= 45 and set(record.x) == set(SSP.load().names)
-    assert run_once(Run(problem=SSP, solver="slsqp", stop=Stop(time_limit_s=1e-9))).status == "time limit reached"
+    assert run_once(Run(problem=SSP, solver="slsqp", time_limit_s=1e-9)).status == "time limit reached"

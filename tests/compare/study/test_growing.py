@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 
 from compare.study.record import RunRecord
-from compare.study.run import Handling, ProblemSpec, Run, Stop, make_inputs, plan_runs
+from compare.study.run import ProblemSpec, Run, make_inputs, plan_runs
 from compare.study.study import RECORDS, Study, read_records, read_study_file, run_study
 from metaheuristics import ParticleSwarm
 from tests.robots.custom import humanoid
 
 WALK, PSO, GA = ProblemSpec(name="walk12"), ("", "pso"), ("", "ga")
-STUDY = {"problems": [WALK], "solvers": [PSO, GA], "runs": 2, "starts": 1, "stop": Stop(evaluations=200)}
+STUDY = {"problems": [WALK], "solvers": [PSO, GA], "runs": 2, "starts": 1, "evaluations": 200}
 
 
 def grow(folder: Path, **changes: Any) -> tuple[list[RunRecord], int]:
@@ -40,9 +40,9 @@ def test_more_runs_solvers_and_problems_continue_what_is_there(tmp_path: Path) -
 
 
 CHANGES: dict[str, dict[str, Any]] = {
-    "budget": {"stop": Stop(evaluations=300)},
+    "budget": {"evaluations": 300},
     "seed": {"seed": 7},
-    "handling": {"handling": Handling(name="epsilon")},
+    "handling": {"handling": "epsilon"},
     "settings": {"solvers": [("pso", ParticleSwarm(population=20))]},
     "parameter": {"problems": [ProblemSpec(name="walk12", values={"lambda": 0.5})]},
     "option": {"problems": [ProblemSpec(name="walk12", options={"intervals": 10})]},
@@ -68,7 +68,7 @@ def find_key(run: Run) -> str:
 
 def test_a_gradient_run_depends_only_on_what_it_heeds() -> None:
     def find(solver: str, **stop: Any) -> str:
-        return find_key(Run(problem=WALK, solver=solver, stop=Stop(**stop)))
+        return find_key(Run(problem=WALK, solver=solver, **stop))
 
     assert find("ipopt", evaluations=300) == find("ipopt", evaluations=400)
     assert find("ipopt", time_limit_s=9.0) != find("ipopt")

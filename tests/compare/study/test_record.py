@@ -15,14 +15,14 @@ from casadi import MX
 from compare.judge import evaluate
 from compare.study.perform import catch_errors
 from compare.study.record import History, RunRecord, Times, read_record
-from compare.study.run import ProblemSpec, Run, Stop, make_inputs
+from compare.study.run import ProblemSpec, Run, make_inputs
 from compare.study.study import Study, read_records, run_study, write_record
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation.registry import check_mathematics
 from tests.backends.toys import row, toy
 from tests.compare.records import judged, run_once
 
-RUN = Run(problem=ProblemSpec(name="walk12"), solver="random", stop=Stop(evaluations=50))
+RUN = Run(problem=ProblemSpec(name="walk12"), solver="random", evaluations=50)
 TEXTS = ("caf\udce9.csv", "\x00\x1b[31m", "a\nb\u2028c", "$x$", "x" * 10**4, "=HYPERLINK(1)", "\ud83d", "", "\u202e")
 NUMBERS = (math.nan, math.inf, -1.0, 2**63, 10**400, True, None)
 
@@ -83,11 +83,7 @@ def test_a_value_that_is_not_finite_at_a_feasible_point_is_a_failure(tmp_path: P
         return (x - 9).log(), (row(x, upper=limit + 9),)
 
     problem = ProblemSpec(name=toy(make))
-    runs = [
-        Run(problem=problem, solver=name, number=k, stop=Stop(evaluations=60))
-        for name in ("random", "slsqp")
-        for k in (0, 1)
-    ]
+    runs = [Run(problem=problem, solver=name, number=k, evaluations=60) for name in ("random", "slsqp") for k in (0, 1)]
     records = run_study(Study(runs=tuple(runs), folder=tmp_path))
     assert ["without an objective" in record.status for record in records] == [True] * 4
     assert not any(record.x for record in records)

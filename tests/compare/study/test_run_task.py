@@ -2,16 +2,17 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from compare.study.run import ProblemSpec, Run, Stop, plan_runs
+from compare.study.run import ProblemSpec, Run, plan_runs
 from compare.study.study import Study, read_records, run_study
 from tests.compare.records import run_once
 
 WALK = ProblemSpec(name="walk12")
-STOP = Stop(evaluations=200, time_limit_s=0.5)
-PATIENT = Stop(evaluations=200, time_limit_s=60.0)  # on a busy machine a process may begin late
+STOP: dict[str, Any] = {"evaluations": 200, "time_limit_s": 0.5}
+PATIENT: dict[str, Any] = {"evaluations": 200, "time_limit_s": 60.0}  # on a busy machine a process may begin late
 
 ALGORITHM = """
 import os, sys, time
@@ -82,12 +83,12 @@ def written(folder: Path, name: str, way: str) -> Path:
 def test_many_hostile_plug_ins_leave_the_others_records_whole(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    alone = run_study(Study(runs=(Run(problem=WALK, solver="pso", stop=STOP),)))
+    alone = run_study(Study(runs=(Run(problem=WALK, solver="pso", **STOP),)))
     solvers, ways = [("", "pso")], {}
     for k, way in enumerate(WAYS):
         ways[f"h{k}"] = way
         solvers.append((f"h{k}", f"{written(tmp_path, f'h{k}', way)}:Algorithm"))
-    runs = plan_runs([WALK], solvers, runs=1, starts=1, stop=STOP)
+    runs = plan_runs([WALK], solvers, runs=1, starts=1, **STOP)
     records = run_study(Study(runs=runs, folder=tmp_path / "out"))
     assert capfd.readouterr().out == ""
     assert len(read_records(tmp_path / "out")[0]) == len(solvers)  # every file is read strictly
@@ -123,7 +124,7 @@ def test_a_plain_function_is_stopped_at_its_budget_even_if_it_ignores_it(
 ) -> None:
     (tmp_path / "own.py").write_text(f"def search({arguments}):\n {body}\n")
     stop = STOP if "time limit" in said else PATIENT
-    record = run_once(Run(problem=WALK, solver=f"{tmp_path / 'own.py'}:search", stop=stop))
+    record = run_once(Run(problem=WALK, solver=f"{tmp_path / 'own.py'}:search", **stop))
     assert re.search(said, record.status)
     is_kept = said in ("evaluation budget used", "time limit reached")
     assert record.reported_feasible == is_kept and (said != "evaluation budget used" or record.counts["f"] == 200)

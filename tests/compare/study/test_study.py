@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from compare.study.record import SCHEMA, read_record
-from compare.study.run import Handling, ProblemSpec, Run, Stop, plan_runs
+from compare.study.run import ProblemSpec, Run, plan_runs
 from compare.study.study import Study, read_records, read_study_file, run_study, write_record
 from metaheuristics import ParticleSwarm, SearchError
 from metaheuristics.interface import Array, Start
@@ -27,7 +27,7 @@ from nlp_gait.errors import GaitError, InputError
 EXAMPLE = Path(__file__).parents[3] / "examples" / "bring_your_own.py"
 SSP = ProblemSpec(name="nao-ssp")
 SOLVERS = [("", "pso"), ("", "ga"), ("", "ipopt"), ("pso-20", ParticleSwarm(population=20))]
-SMALL = plan_runs([ProblemSpec(name="walk12")], SOLVERS, runs=2, starts=2, stop=Stop(evaluations=500))
+SMALL = plan_runs([ProblemSpec(name="walk12")], SOLVERS, runs=2, starts=2, evaluations=500)
 
 
 def contents(folder: Path) -> dict[str, Any]:
@@ -120,7 +120,7 @@ class Broken:
 
 
 def test_a_run_that_raises_is_a_record_with_the_reason(tmp_path: Path) -> None:
-    tasks = (Run(problem=SSP, solver=Broken()), Run(problem=SSP, solver="pso", stop=Stop(evaluations=100)))
+    tasks = (Run(problem=SSP, solver=Broken()), Run(problem=SSP, solver="pso", evaluations=100))
     broken, good = run_study(Study(runs=tasks, folder=tmp_path))
     assert broken.status == "failed: RuntimeError: no <luck>" and not broken.reported_feasible and not broken.feasible
     assert good.counts == {"f": 100}
@@ -143,11 +143,11 @@ def test_a_run_that_takes_its_process_with_it_is_failed_and_the_others_are_compl
         (Run(problem=SSP, solver="pso", settings={"inertial": 1}), "no setting 'inertial'"),
         (Run(problem=SSP, solver="ipopt", settings={"tol": 1}), "unknown setting of ipopt 'tol'"),
         (Run(problem=SSP, solver="slsqp", settings={"tol": 1}), "unknown setting of slsqp 'tol'"),
-        (Run(problem=SSP, solver="slsqp", stop=Stop(evaluations=9)), "at least 10 evaluations"),
-        (Run(problem=SSP, solver="pso", stop=Stop(evaluations=9)), "population of 'pso', 50, got 9"),
-        (Run(problem=SSP, solver="pso", handling=Handling(name="penalty")), "needs a value for 'weight'"),
-        (Run(problem=SSP, solver="pso", handling=Handling(name="debb")), "unknown constraint handling 'debb'"),
-        (Run(problem=SSP, solver="ipopt", stop=Stop(time_limit_s=0.0)), "time_limit_s must be"),
+        (Run(problem=SSP, solver="slsqp", evaluations=9), "at least 10 evaluations"),
+        (Run(problem=SSP, solver="pso", evaluations=9), "population of 'pso', 50, got 9"),
+        (Run(problem=SSP, solver="pso", handling="penalty"), "penalty=WEIGHT"),
+        (Run(problem=SSP, solver="pso", handling="debb"), "penalty=WEIGHT"),
+        (Run(problem=SSP, solver="ipopt", time_limit_s=0.0), "time_limit_s must be"),
         (Run(problem=SSP, solver="pso", label="../../etc"), "label has 1 to 64 letters"),
         (Run(problem=SSP, solver="pso", seed=2**63 - 1, number=1), "64 bits"),
         (Run(problem=ProblemSpec(name="nao-spp"), solver="pso"), "unknown problem"),

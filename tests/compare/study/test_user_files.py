@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.study.run import ProblemSpec, Run, Stop
+from compare.study.run import ProblemSpec, Run
 from compare.study.study import Study, run_study
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
@@ -63,7 +63,7 @@ def test_a_problem_with_random_numbers_is_refused_before_anything_runs(tmp_path:
     name = write(tmp_path / "r", 1)
     (tmp_path / "r" / "sizes.py").write_text("import random\nSIZE = random.random()\n")
     with pytest.raises(InputError, match="two loads of the problem .* differ: fix the seed"):
-        run_once(Run(problem=ProblemSpec(name=name), solver="random", stop=Stop(evaluations=50)))
+        run_once(Run(problem=ProblemSpec(name=name), solver="random", evaluations=50))
 
 
 @pytest.mark.parametrize("changed", ["own.py", "sizes.py"])
@@ -80,9 +80,7 @@ def test_a_file_that_changes_while_the_study_runs_ends_it(tmp_path: Path, change
         (tmp_path / changed).write_text((tmp_path / changed).read_text() + "M = 2\n")
         time.sleep(0.1)
 
-    runs = tuple(
-        Run(problem=WALK, solver=f"{tmp_path}/own.py:search", number=k, stop=Stop(evaluations=9)) for k in (0, 1)
-    )
+    runs = tuple(Run(problem=WALK, solver=f"{tmp_path}/own.py:search", number=k, evaluations=9) for k in (0, 1))
     with pytest.raises(InputError, match="has changed since the study began; the 1 runs before it are stored: rerun"):
         run_study(Study(runs=runs, folder=tmp_path / "study"), edit)
     records = run_study(Study(runs=runs, folder=tmp_path / "study"))

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from compare.study.pack import INDEX, pack_study, unpack_archive
-from compare.study.run import ProblemSpec, Stop, plan_runs
+from compare.study.run import ProblemSpec, plan_runs
 from compare.study.study import Study, read_records, run_study, write_records
 from compare.study.verify import Difference, Verification, compute_chance, verify_study
 from nlp_gait.errors import InputError
@@ -23,7 +23,7 @@ WALK = ProblemSpec(name="walk12")
 
 
 def make_study(folder: Path, *solvers: str, problem: ProblemSpec = WALK, runs: int = 3) -> Path:
-    planned = plan_runs([problem], [("", name) for name in solvers], runs=runs, starts=1, stop=Stop(evaluations=100))
+    planned = plan_runs([problem], [("", name) for name in solvers], runs=runs, starts=1, evaluations=100)
     run_study(Study(runs=planned, folder=folder, jobs=2))
     return folder
 
