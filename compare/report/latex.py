@@ -79,8 +79,7 @@ def escape_latex(text: str) -> str:
 def describe_run_counts(comparison: Comparison) -> str:
     """Return for example "20 runs of each solver, at most 10,000 evaluations of a search"."""
     runs = sorted({len(solver.records) for solver in comparison.solvers})
-    stops = [record.inputs.stop for record in comparison.records]
-    budgets = sorted({stop["evaluations"] for stop in stops if "evaluations" in stop})
+    budgets = sorted({record.inputs.evaluations for record in comparison.records if record.inputs.evaluations})
     count = " to ".join(map(str, dict.fromkeys((runs[0], runs[-1]))))
     budget = f", at most {join_words(f'{budget:,}' for budget in budgets)} evaluations of a search" if budgets else ""
     return f"{count} run{'s' * (runs[-1] > 1)} of each solver{budget}"

@@ -68,8 +68,9 @@ def list_runs(folder: Path, names: Sequence[str], command: str = "") -> None:
         solvers = {_name_solver(name) for name in names}
         kept = [name for name in file.runs if _name_solver(name) not in solvers]
         if command or set(file.runs) != {*kept, *names}:
-            last = {"command": command, "date": format_now()} if command else {}
-            write_json(folder / FILE, asdict(replace(file, runs=(*kept, *dict.fromkeys(names)), **last)))
+            file = replace(file, runs=(*kept, *dict.fromkeys(names)))
+            file = replace(file, command=command, date=format_now()) if command else file
+            write_json(folder / FILE, asdict(file))
 
 
 def _name_solver(name: str) -> str:
