@@ -9,12 +9,13 @@ import numpy as np
 from compare.analysis.comparison import Comparison, compare_problems, index_solvers
 from compare.analysis.overview import count_wins, explain_marks, tabulate_problems
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
-from compare.bench.baseline import EVALUATIONS, get_reference, load_baseline
+from compare.bench.baseline import get_reference, load_baseline
 from compare.drawing.comparison_figures import make_ecdf_charts
 from compare.report.document import Document, Section, Table, make_text_table
 from compare.report.provenance import TERMS
 from compare.report.study_sections import make_chart_figure
 from compare.study.record import RunRecord
+from compare.study.run import EVALUATIONS
 
 HOW = (
     "Every solver makes {runs} runs on each instance, with {evaluations} evaluations each, run k with the seed k; IPOPT and "

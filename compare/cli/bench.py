@@ -6,13 +6,14 @@ from typing import Annotated, Literal
 
 from typer import Option
 
-from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, load_table, plan_bench_runs
+from compare.bench.baseline import BASELINE, RUNS, choose_instances, load_table, plan_bench_runs
 from compare.bench.leaderboard import make_leaderboard_page, rank_solvers
 from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
 from compare.cli.options import Evaluations, Jobs, Scheduler, parse_names
 from compare.cli.printing import Output, Rows, describe_command
 from compare.report.writing import add_origin, write_document
+from compare.study.run import EVALUATIONS
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
 

@@ -75,7 +75,12 @@ def _locate_mass(phase: Any, now: Instant) -> SX:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Samples:
-    """A phase at N + 1 samples; columns are samples."""
+    """A phase at N + 1 samples; columns are samples.
+
+    Each phase has its own frame, in the axes of the ground: x forward, y to the left from the middle of the robot, z up from the
+    sole of the left foot, which stands while the right one swings; a step on the other foot is the mirror image. In cycles and
+    walks x = 0 is below the left ankle, in a single phase where the right foot lifts off: read places relative to a foot.
+    """
 
     joints: tuple[str, ...]  # rows of torque
     moving: tuple[str, ...]  # rows of power and of the motion
