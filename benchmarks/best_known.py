@@ -21,8 +21,7 @@ from nlp_gait.backends.exact import build_exact_model, describe_difference, iden
 from nlp_gait.decoding import decode
 from nlp_gait.files import read_json, write_json
 from nlp_gait.formulation import GaitProblem, load
-from nlp_gait.formulation.result import StoredProblem, load_result
-from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, StoredProblem, load_result
 from nlp_gait.proofs.certificate import find_certificate, load_certificates
 
 FILE = Path(str(compare.study.__file__)).with_name("best_known.json")

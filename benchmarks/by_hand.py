@@ -10,8 +10,7 @@ import pinocchio as pin
 
 import nlp_gait
 from benchmarks.rows import Array
-from nlp_gait.gaits.nao.body import GRAVITY, make_nao
-from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
+from nlp_gait.gaits.nao.body import GRAVITY, HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, make_nao
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import TreeBody, make_tree
 

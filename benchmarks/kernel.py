@@ -23,8 +23,7 @@ from nlp_gait.backends.kernel.compiled import SHARED, NativeRows
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes, write_rows_source
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.biped.body import Body
-from nlp_gait.gaits.nao.body import make_nao
-from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
+from nlp_gait.gaits.nao.body import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS, make_nao
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.tape import simplify
@@ -43,8 +42,8 @@ def paths(rounds: int) -> list[Row]:
     """The objective with its violation by every path, one core, batch 1000."""
     problem = nlp_gait.load("nao-ssp")
     X = candidates(problem, BATCH)
-    objective = nlp_gait.compile_objective(problem, require_compiler=True, threads=1)
-    scalar = nlp_gait.compile_objective(problem, require_compiler=True, threads=1, lanes=1)
+    objective = nlp_gait.compile_objective(problem, require_compiler=True)
+    scalar = nlp_gait.compile_objective(problem, require_compiler=True, lanes=1)
     by_hand = ByHand()
     machine = _with_violation(problem)
     share = 20  # the slow paths get a part of the batch
@@ -161,10 +160,10 @@ def _torques(rounds: int, body: Body, moving: Sequence[str], upright: Collection
 
 
 def growth(rounds: int) -> list[Row]:
-    """Cost by samples, batch size and threads."""
+    """Cost by samples and batch size."""
     rows, last = [], {}
     objectives = {
-        intervals + 1: nlp_gait.compile_objective(nlp_gait.load("nao-ssp", intervals=intervals), threads=1)
+        intervals + 1: nlp_gait.compile_objective(nlp_gait.load("nao-ssp", intervals=intervals))
         for intervals in (10, 40, 100, 1000)
     }
     X = candidates(objectives[11].problem, 200)
@@ -177,18 +176,6 @@ def growth(rounds: int) -> list[Row]:
         X = candidates(objective.problem, count)
         last = side_by_side({"kernel": lambda X=X: objective(X)}, 3 if count > 1000 else rounds)
         rows.append(Row(name=f"batch {count}, a candidate", value=np.median(last["kernel"]) / count * 1e6, unit="us"))
-    X = candidates(objective.problem, 10_000)
-    two = nlp_gait.compile_objective(objective.problem, threads=2)
-    times = side_by_side({"one": lambda: objective(X), "two": lambda: two(X)}, max(3, rounds // 2))
-    rows.append(
-        Row(
-            name="two threads, batch 10,000",
-            value=ratio(times["one"], times["two"]),
-            unit="x",
-            required=1.7,
-            note="means something on an idle machine only",
-        )
-    )
     return rows
 
 
@@ -205,7 +192,7 @@ class PymooProblem(Problem):
 
 def swarms(rounds: int) -> list[Row]:
     """Our PSO against pymoo's: 50 particles, 200 generations, on the kernel and on NumPy with Pinocchio."""
-    objective = nlp_gait.compile_objective(nlp_gait.load("nao-ssp"), require_compiler=True, threads=1)
+    objective = nlp_gait.compile_objective(nlp_gait.load("nao-ssp"), require_compiler=True)
     fast, slow = PymooProblem(objective), PymooProblem(ByHand())
     generations = EVALUATIONS // POPULATION
 

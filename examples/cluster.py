@@ -14,8 +14,7 @@ from distributed import LocalCluster
 
 from compare.analysis.columns import summarise
 from compare.analysis.comparison import compare_problems
-from compare.drawing.charts import plot_charts
-from compare.drawing.comparison_figures import make_final_gap_charts
+from compare.drawing.charts import make_final_gap_charts, plot_charts
 from compare.study.run import ProblemSpec, Run
 from compare.study.study import Study, run_study
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from compare.analysis.columns import format_rows
 from compare.analysis.comparison import compare_problems
-from compare.drawing.charts import plot_charts
-from compare.drawing.comparison_figures import make_convergence_charts
+from compare.drawing.charts import make_convergence_charts, plot_charts
 from compare.report.document import Document, make_text_table
 from compare.report.writing import render_markdown
 from compare.study.run import ProblemSpec, Run

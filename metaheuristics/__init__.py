@@ -10,18 +10,20 @@ from metaheuristics.algorithms.ant_colony import AntColony, AntColonyGrid
 from metaheuristics.algorithms.genetic import Flip, GeneticAlgorithm, Polynomial, SimulatedBinary, SinglePoint
 from metaheuristics.algorithms.particle_swarm import ParticleSwarm
 from metaheuristics.algorithms.random_search import RandomSearch
-from metaheuristics.constraint_handling import Deb, EpsilonLevel, StaticPenalty
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import (
     Algorithm,
     BatchObjective,
     ConstraintHandling,
+    Deb,
+    EpsilonLevel,
     History,
     Interrupted,
     Result,
     Rule,
     Search,
     Start,
+    StaticPenalty,
 )
 from metaheuristics.minimize import EarlyStop, minimize
 from metaheuristics.preparation import check_budget

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import ThreadpoolController
 
 from metaheuristics import interface, preparation
-from metaheuristics.constraint_handling import Deb
 from metaheuristics.errors import SearchError, abbreviate, is_number
 from metaheuristics.interface import (
     Algorithm,
@@ -23,6 +22,7 @@ from metaheuristics.interface import (
     BatchObjective,
     CallingSearch,
     ConstraintHandling,
+    Deb,
     Ended,
     Rule,
     Search,

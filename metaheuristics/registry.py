@@ -13,9 +13,8 @@ from metaheuristics.algorithms.differential_evolution import DifferentialEvoluti
 from metaheuristics.algorithms.genetic import GeneticAlgorithm, GoswamiGeneticAlgorithm
 from metaheuristics.algorithms.particle_swarm import ConstantInertiaSwarm, ParticleSwarm
 from metaheuristics.algorithms.random_search import RandomSearch
-from metaheuristics.constraint_handling import Deb, EpsilonLevel, StaticPenalty
 from metaheuristics.errors import SearchError, abbreviate, check_installed, is_installed
-from metaheuristics.interface import Algorithm, ConstraintHandling
+from metaheuristics.interface import Algorithm, ConstraintHandling, Deb, EpsilonLevel, StaticPenalty
 
 T = TypeVar("T")
 

@@ -22,7 +22,7 @@ PROBLEMS = {
     "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
     "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",
     "stairs-climb": "nlp_gait.gaits.stairs.climb:stairs_climb",
-    "gaitbench": "nlp_gait.gaitbench.suite_problem:gaitbench",
+    "gaitbench": "nlp_gait.gaitbench.generated:gaitbench",
 }
 LIMITS = {name: f"nlp_gait.gaits.biped.limits:{name}" for name in ("FrictionCone", "FootClearance")}
 

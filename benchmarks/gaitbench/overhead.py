@@ -35,7 +35,7 @@ def adapter(rounds: int, id: str = "ssp-v5") -> list[Row]:
     instance = gaitbench.load(id)
     problems = {
         "adapter": instance.to("pymoo"),
-        "by hand": ByHand(compile_objective(instance.gait_problem, require_compiler=True, threads=1)),
+        "by hand": ByHand(compile_objective(instance.gait_problem, require_compiler=True)),
     }
     ends: dict[str, Any] = {}
 

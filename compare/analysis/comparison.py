@@ -9,7 +9,6 @@ from statistics import median
 
 import numpy as np
 
-from compare.analysis.best_known import ZERO, compute_gap, is_zero
 from compare.analysis.record_statistics import (
     Curve,
     Pair,
@@ -20,7 +19,7 @@ from compare.analysis.record_statistics import (
     make_curve,
     tie,
 )
-from compare.analysis.units import FOUND, format_gap, name_solver, with_unit
+from compare.analysis.units import FOUND, ZERO, compute_gap, format_gap, is_zero, name_solver, with_unit
 from compare.study.record import RunRecord, find_best, group_by
 from compare.study.references import BETTER, OWN, Reference, find_reference
 from compare.study.run import GRADIENT_SOLVERS

@@ -10,7 +10,7 @@ from itertools import combinations, count
 
 import numpy as np
 
-from compare.analysis.best_known import compute_gap, is_zero
+from compare.analysis.units import compute_gap, is_zero
 from compare.study.record import RunRecord, find_best
 from nlp_gait.formulation import Array, Objective
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE

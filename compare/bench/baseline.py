@@ -12,8 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from compare.analysis.best_known import is_zero
 from compare.analysis.record_statistics import ECDF_TARGETS
+from compare.analysis.units import is_zero
 from compare.study.record import History, RunRecord, Times
 from compare.study.run import EVALUATIONS, GRADIENT_SOLVERS, Inputs, ProblemSpec, Run, plan_runs
 from nlp_gait import gaitbench

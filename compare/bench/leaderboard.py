@@ -10,7 +10,7 @@ from compare.analysis.comparison import Comparison, compare_problems, index_solv
 from compare.analysis.overview import count_wins, explain_marks, tabulate_problems
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
 from compare.bench.baseline import get_reference, load_baseline
-from compare.drawing.comparison_figures import make_ecdf_charts
+from compare.drawing.charts import make_ecdf_charts
 from compare.report.document import Document, Section, Table, make_text_table
 from compare.report.provenance import TERMS
 from compare.report.study_sections import make_chart_figure

@@ -38,7 +38,7 @@ PANELS = {
     },
     "Show and share": {
         "simulate": ("simulate:simulate", "Simulate a gait in MuJoCo."),
-        "export": ("export:export", "Write a gait, an instance or a problem for others."),
+        "export": ("exchange:export", "Write a gait, an instance or a problem for others."),
     },
 }
 

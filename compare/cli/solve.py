@@ -9,8 +9,7 @@ import numpy as np
 from typer import Option
 
 import nlp_gait
-from compare.analysis.best_known import describe_value
-from compare.analysis.units import with_unit
+from compare.analysis.units import describe_value, with_unit
 from compare.cli import options
 from compare.cli.command import OUTPUT_FILE, command, report_interrupts
 from compare.cli.printing import Output, Rows, fail, say, show_progress

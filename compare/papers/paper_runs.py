@@ -103,10 +103,7 @@ def make_start_tasks(
 def make_search_tasks(problem: ProblemSpec, algorithms: Mapping[str, Algorithm], runs: int, budget: int) -> list[Run]:
     """Return tasks of searches by label; run k has seed k."""
     searches = product(algorithms.items(), range(runs))
-    return [
-        Run(problem=problem, solver=solver, label=label, evaluations=budget, number=k)
-        for (label, solver), k in searches
-    ]
+    return [Run(problem=problem, solver=s, label=label, evaluations=budget, number=k) for (label, s), k in searches]
 
 
 @cache
@@ -126,7 +123,7 @@ def collect_cloud(spec: ProblemSpec, algorithm: str, evaluations: int, seed: int
     """Return variables and objective (n + 1,) of feasible points in the order of a search, at most ``CLOUD`` of them."""
     parts = list[Array]()
     minimize(
-        compile_objective(spec.load(), threads=1),
+        compile_objective(spec.load()),
         make_algorithm(algorithm),
         evaluations=evaluations,
         seed=seed,

@@ -19,9 +19,9 @@ from compare.analysis.units import (
     with_unit,
 )
 from compare.drawing.figures import make_figure, use_style
-from compare.questions.perturbed_problem import get_quantity, is_mass, perturb_robot
 from compare.questions.question import Answer, Question, Work, make_record_table
 from compare.report.document import Figure, Part, make_text_table
+from compare.study.run import ProblemSpec
 from nlp_gait.backends.exact import identify_problem
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, differentiate_by_models, differentiate_by_parameters
@@ -32,7 +32,28 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Outcome
 from nlp_gait.interrupts import Progress
-from nlp_gait.robots.perturbation import list_quantities
+from nlp_gait.robots.perturbation import MASS as MASS_ENDING
+from nlp_gait.robots.perturbation import list_quantities, name_perturbed, split_name
+
+
+def is_mass(quantity: str) -> bool:
+    """Return True for a factor of masses, False for a length that is added [m]."""
+    return quantity.endswith(MASS_ENDING)
+
+
+def get_quantity(problem: GaitProblem, quantity: str) -> float:
+    """Return the value of a quantity of the problem's robot; see ``nlp_gait.robots.perturbation``."""
+    _, changes = split_name(str(problem.options["robot"]))
+    return changes.get(quantity, float(is_mass(quantity)))
+
+
+def perturb_robot(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
+    """Return the problem with other values of its robot's quantities; errors in a robot's data do not move the limits."""
+    name, changes = split_name(str(problem.options["robot"]))
+    robot = name_perturbed(name, {**changes, **values})
+    spec = ProblemSpec(name=problem.address, options={**problem.options, "robot": robot}, values=problem.values)
+    return spec.load().with_values(**problem.parameter_values)
+
 
 # A variable that moves by less than this share of its range over a natural step counts as constant.
 CONSTANT = 1e-9

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
-from compare.analysis.best_known import describe_value
+from compare.analysis.units import describe_value
 from compare.report.document import Document, Table, Value, make_text_table
 from compare.report.writing import write_document
 from compare.study.memo import Memo

@@ -1,6 +1,5 @@
 """Report of a study, from its records only: ``report.html`` and ``report.md``."""
 
-from compare.report.study_files import FurtherFiles
-from compare.report.study_report import renew_report, write_report
+from compare.report.study_report import FurtherFiles, renew_report, write_report
 
 __all__ = ["FurtherFiles", "renew_report", "write_report"]

@@ -12,8 +12,7 @@ from compare.analysis.columns import format_rows
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import write_headlines
 from compare.analysis.units import name_solver
-from compare.drawing.charts import plot_charts
-from compare.drawing.comparison_figures import make_final_gap_charts
+from compare.drawing.charts import make_final_gap_charts, plot_charts
 from compare.drawing.figures import share_looks
 from compare.report.latex import format_latex_overview, format_latex_table
 from compare.report.study_report import write_report

@@ -9,8 +9,7 @@ from compare.analysis.comparison import Comparison
 from compare.analysis.headline import describe_unknown, write_headline
 from compare.analysis.overview import describe_tests, explain_marks, rank_over_problems, tabulate_problems
 from compare.analysis.units import BY_UNIT, name_in_words, name_solver, with_unit
-from compare.drawing.charts import Chart, draw_chart
-from compare.drawing.comparison_figures import make_convergence_charts, make_ecdf_charts, make_final_gap_charts
+from compare.drawing.charts import Chart, draw_chart, make_convergence_charts, make_ecdf_charts, make_final_gap_charts
 from compare.drawing.gait_figure import GaitCurves, draw_gaits, make_gait_charts, prepare_gait
 from compare.report.document import Figure, Part, Prose, Section, Table, make_table_section, make_text_table
 from compare.report.interactive import describe_gaits

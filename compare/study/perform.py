@@ -208,7 +208,7 @@ def run_search(run: Run, inputs: Inputs, callback: Reporter | None = None) -> Se
     if (files is not None and files.digest != inputs.code) or identify_problem(problem) != inputs.problem:
         raise ChangedFileError("a file of the problem or of a solver has changed since the study began")
     built = time.perf_counter()
-    objective = compile_objective(problem, threads=1)  # runs take the processors
+    objective = compile_objective(problem)
     compiled = time.perf_counter()
     folder = os.getcwd()
     try:

@@ -29,9 +29,8 @@ from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import LARGEST_FILE, check_plain, convert_errors, read_json, replace_nan
 from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.formulation.registry import resolve_stored
-from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.signals import import_pandas
-from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
+from nlp_gait.formulation.solution import ActiveConstraint, Evaluations, StoredProblem
 
 T = TypeVar("T")
 K = TypeVar("K")

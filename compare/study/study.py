@@ -264,7 +264,7 @@ def _prepare(runs: Sequence[Run]) -> None:
 
     for problem in {run.problem.title: run.problem for run in runs if run.is_search}.values():
         with suppress(GaitError):
-            compile_objective(problem.load(), threads=1)
+            compile_objective(problem.load())
 
 
 def _run_here(items: Sequence[Item], workers: int) -> Iterator[tuple[int, RunRecord]]:

@@ -19,7 +19,7 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation.added_limits import split_names
 from nlp_gait.formulation.registry import resolve_stored
-from nlp_gait.formulation.result import StoredProblem
+from nlp_gait.formulation.solution import StoredProblem
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import resolve_code
 

@@ -28,10 +28,9 @@ from nlp_gait.gaitbench.instance import Instance
 from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.phase_problem import make_goal
+from nlp_gait.gaits.biped.phase_problem import ON_GROUND, list_limbs, make_goal, make_level_sole, place_links
 from nlp_gait.gaits.biped.problems import GridOptions
 from nlp_gait.gaits.biped.samples import BOTH_FEET
-from nlp_gait.gaits.biped.skeleton import ON_GROUND, list_limbs, make_level_sole, place_links
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.robots.tree import make_tree

@@ -19,7 +19,7 @@ from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem, Result, load
 from nlp_gait.formulation.solution import ConstraintValue, Solution
 from nlp_gait.gaits.biped.body import TIMED_UNITS, Body
-from nlp_gait.gaits.biped.cycle_motion import STEP
+from nlp_gait.gaits.biped.cycle import STEP
 from nlp_gait.gaits.biped.footholds import list_arc, list_swings, parse_footholds, read_footholds
 from nlp_gait.gaits.biped.support_phases import compute_sole_margins
 from nlp_gait.gaits.biped.walk import name_speed

@@ -11,7 +11,7 @@ import numpy as np
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import format_csv, replace_file, write_json, write_text
 from nlp_gait.formulation import Array, Result, Signals, sample_at_period, sample_signals
-from nlp_gait.formulation.result import SCHEMA
+from nlp_gait.formulation.solution import SCHEMA
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import load_mujoco

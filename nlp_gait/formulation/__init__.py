@@ -17,8 +17,8 @@ from nlp_gait.formulation.assembly import (
 from nlp_gait.formulation.display import Display, SimulationModel
 from nlp_gait.formulation.gait_problem import GaitProblem, SolverHints, Start
 from nlp_gait.formulation.registry import list_problems, load, maker
-from nlp_gait.formulation.result import Result, load_result, sample_at_period, sample_finely, sample_signals
 from nlp_gait.formulation.signals import Array, Columns, Signals, make_vector_columns
+from nlp_gait.formulation.solution import Result, load_result, sample_at_period, sample_finely, sample_signals
 
 __all__ = [
     "Array",

@@ -114,9 +114,6 @@ def make_variables(*table: tuple[str, str, float, float, str]) -> tuple[Variable
     )
 
 
-Quadrature = Literal["trapezoid", "simpson"]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
     """Instants at which a problem evaluates its motion."""
@@ -125,25 +122,18 @@ class Grid:
     samples_per_interval: int = 1  #: above 1 for more samples than these limits need
     #: Option of the problem's maker to multiply for a denser grid; None if the variables depend on the grid
     refined_by: Literal["intervals", "samples_per_interval"] | None = None
-    rule: Quadrature = "trapezoid"  #: of means over time
 
     def __post_init__(self) -> None:
         for name in ("intervals", "samples_per_interval"):
             count = getattr(self, name)
             if isinstance(count, bool) or not isinstance(count, int) or count < 1:
                 raise InputError(f"{name} must be a whole number >= 1, got {count!r}")
-        check_choice("rule", self.rule, get_args(Quadrature))
         check_choice("refined_by", self.refined_by, (None, "intervals", "samples_per_interval"))
-        if self.rule == "simpson" and self.parts % 2:
-            raise InputError(f"rule='simpson' needs an even number of parts between the samples, got {self.parts}")
 
     @property
     def weights(self) -> Array:
-        """Weights (N + 1,) of the samples in a mean over time, whose sum is one."""
+        """Weights (N + 1,) of the samples in a mean over time by the trapezoidal rule, whose sum is one."""
         weights = np.ones(self.parts + 1)
-        if self.rule == "simpson":
-            weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
-            return weights / (3 * self.parts)
         weights[[0, -1]] = 0.5
         return weights / self.parts
 
@@ -236,6 +226,11 @@ class Constraint:
             return bound if bound.shape[0] == m else ca.repmat(bound, m, 1)
 
         return self.value, column(self.lower, -math.inf), column(self.upper, math.inf)
+
+
+def make_labels(rows: Sequence[str], columns: Sequence[int] | range) -> tuple[str, ...]:
+    """Return row labels of a constraint on a (rows, columns) matrix in column-major order: ``"HK, 12"``."""
+    return tuple(f"{row}, {k}" for k in columns for row in rows)
 
 
 def _count_rows(owner: str, field: str, value: object) -> int:

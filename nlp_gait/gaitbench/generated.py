@@ -12,18 +12,20 @@ import hashlib
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass, field, replace
+from functools import cache, lru_cache
 
+import casadi as ca
 import numpy as np
 
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError, check_count, unknown
-from nlp_gait.formulation import GaitProblem, load
+from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Point, load, maker
 from nlp_gait.gaitbench.facts import BY_ID, Definition, get_definition, read_data
-from nlp_gait.gaitbench.transform import AffineMap, rotate_pairs
+from nlp_gait.gaitbench.transform import AffineMap, change_variables, hold_constant, rotate_pairs
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.perturbation import name_perturbed
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 PREFIX = "gb2"
 ID = re.compile(rf"{PREFIX}:([a-z0-9-]+):(0|[1-9][0-9]{{0,11}})")
@@ -183,3 +185,47 @@ def draw_box(problem: GaitProblem, id: str) -> AffineMap:
     matrix = problem.scale[:, None] * rotation * (width * mirror)
     offset = problem.lower + problem.scale * centre - matrix @ place
     return AffineMap(matrix=matrix, offset=offset, lower=np.zeros(n), upper=np.ones(n))
+
+
+# No search satisfies an equation to the last bit: it becomes a band of this share of its row's scale to either side.
+BAND = 1e-2
+
+
+@maker
+def gaitbench(*, instance: str = "ssp-v5") -> GaitProblem:
+    """Make a problem of the suite by the id of its instance, of GaitBench 1 or generated; raises UnknownNameError.
+
+    Source:
+        GaitBench, whose instances name their papers.
+    """
+    return _make(instance)
+
+
+@lru_cache(maxsize=64)
+def _make(id: str) -> GaitProblem:
+    definition = define(id)
+    problem = _convert(load(definition.problem, **definition.options), definition)
+    return change_variables(problem, draw_box(problem, id)) if is_generated(id) else problem
+
+
+def _convert(base: GaitProblem, definition: Definition) -> GaitProblem:
+    base = base.with_values(**definition.values)
+    banded = hold_constant(base, definition.held).derive(
+        name="gaitbench", title=f"GaitBench: {definition.what}", change=_widen_equations
+    )
+    problem = replace(banded, hints=replace(banded.hints, searchable=True))
+    if (refine := base.refine) is None:
+        return problem
+    return replace(problem, refine=lambda factor: _convert(refine(factor), definition))
+
+
+def _widen_equations(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
+    return replace(assembly, constraints=tuple(map(_widen, assembly.constraints)))
+
+
+def _widen(constraint: Constraint) -> Constraint:
+    lower, upper = constraint.lower, constraint.upper
+    if lower is None or upper is None or lower.shape != upper.shape or not ca.is_equal(lower, upper, 2):
+        return constraint
+    width = BAND * constraint.scale
+    return replace(constraint, lower=lower - width, upper=upper + width)

@@ -21,8 +21,7 @@ from nlp_gait.files import make_writable_folder, replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.adapters import find_adapter
 from nlp_gait.gaitbench.facts import Evidence, Facts, find_shipped_facts
-from nlp_gait.gaitbench.generated import STARTS, define, is_generated, make_id, parse_id
-from nlp_gait.gaitbench.suite_problem import gaitbench
+from nlp_gait.gaitbench.generated import STARTS, define, gaitbench, is_generated, make_id, parse_id
 
 SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
 # Slack of the best known point in every row, in units of its scale: no machine's rounding makes it infeasible.
@@ -159,7 +158,7 @@ class Instance:
     @cached_property
     def _objective(self) -> CompiledObjective:
         with _BUILDING:
-            return compile_objective(self.gait_problem, threads=1)  # a pool of threads does not survive a fork
+            return compile_objective(self.gait_problem)
 
     @cached_property
     def sides(self) -> OneSidedRows:

@@ -10,7 +10,7 @@ import nlp_gait
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.export.formats import write_as
 from nlp_gait.formulation import Result
-from nlp_gait.formulation.result import sample_at_period
+from nlp_gait.formulation.solution import sample_at_period
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan

@@ -66,7 +66,7 @@ import numpy as np
 import nlp_gait
 
 problem = nlp_gait.load("nao-ssp")
-objective = nlp_gait.compile_objective(problem, threads=2)
+objective = nlp_gait.compile_objective(problem)
 X = np.random.default_rng(0).uniform(objective.lower, objective.upper, (4000, len(objective.names)))
 
 def inherited(_):
@@ -81,7 +81,7 @@ def solved(k):
 
 if __name__ == "__main__":
     for _ in range(3):
-        expected = objective(X)[0].tolist()  # the threads of the parent have worked
+        expected = objective(X)[0].tolist()
     with multiprocessing.get_context(sys.argv[1]).Pool(2) as pool:
         assert pool.map(sent, [objective] * 4) == [expected] * 4
         if sys.argv[1] == "fork":
@@ -132,7 +132,7 @@ import metaheuristics, nlp_gait
 from compare.study.run import GRADIENT_SOLVERS, list_solvers
 from nlp_gait.backends.solvers.registry import make_solver
 problem = nlp_gait.load("nao-ssp", intervals=4)
-objective = nlp_gait.compile_objective(problem, threads=1)
+objective = nlp_gait.compile_objective(problem)
 for name in list_solvers():
     if name in GRADIENT_SOLVERS:
         continue

@@ -10,14 +10,13 @@ import pytest
 
 from compare.judge import evaluate
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Grid, load
+from nlp_gait.formulation import load
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.providers import PROBLEMS
 from tests.evaluation import evaluated
 from tests.robots.crooked import crooked
 
-# Another value for each option that is no choice among some; a grid with free joints needs a sample in its middle, one of
-# stairs by Simpson's rule an even number of parts in each phase.
+# Another value for each option that is no choice among some; a grid with free joints needs a sample in its middle.
 OTHER: dict[str, Any] = {
     "robot": "nao-v6",
     "steps": 4,
@@ -130,23 +129,3 @@ def test_values_that_are_not_numbers_are_refused(value: Any) -> None:
         load("nao-ssp").with_values(**{"swing_height_m.lower": value})
     with pytest.raises(InputError, match="option intervals must be a whole number"):
         load("nao-ssp", intervals=value)
-
-
-def test_simpsons_rule_averages_power_and_margins() -> None:
-    """Means over ten parts of a phase, against those over 320; power has kinks, the margin in x has none."""
-
-    def average(rule: str, samples: int) -> dict[str, float]:
-        problem = load("nao-dsp", rule=rule, samples_per_interval=samples)
-        lower, upper = (np.array([problem.value(f"{n}.{end}") for n in problem.names]) for end in ("lower", "upper"))
-        return evaluated(problem, 0.4 * lower + 0.6 * upper).indexes
-
-    limit, plain, simpson = average("simpson", 32), average("trapezoid", 1), average("simpson", 1)
-    assert abs(simpson["dbm_x_mean_m"] - limit["dbm_x_mean_m"]) < 0.1 * abs(
-        plain["dbm_x_mean_m"] - limit["dbm_x_mean_m"]
-    )
-    assert limit["power_W"] == pytest.approx(average("trapezoid", 32)["power_W"], rel=1e-3) != simpson["power_W"]
-    for rule, weights in {"trapezoid": [1, 2, 2, 2, 1], "simpson": [1, 4, 2, 4, 1]}.items():
-        grid = Grid(intervals=4, rule=rule)  # type: ignore[arg-type]
-        np.testing.assert_allclose(grid.weights, np.array(weights) / sum(weights))
-    with pytest.raises(InputError, match="rule='simpson' needs an even number of parts"):
-        load("nao-ssp", rule="simpson", intervals=9)

@@ -24,7 +24,7 @@ from nlp_gait.formulation import (
     Variable,
 )
 from nlp_gait.formulation.registry import check_mathematics
-from nlp_gait.formulation.result import load_result
+from nlp_gait.formulation.solution import load_result
 from nlp_gait.user_code import read_source_files
 from tests.backends.toys import corner, toy
 from tests.robots.custom import humanoid
@@ -153,7 +153,6 @@ def test_both_spellings_of_a_sense_mean_the_same(spelling: Any) -> None:
     ("make", "name"),
     [
         (lambda value: Objective(name="f", unit="1", sense=value), "objective 'f': sense"),
-        (lambda value: Grid(intervals=2, rule=value), "rule"),
         (lambda value: Grid(intervals=2, refined_by=value), "refined_by"),
         (lambda value: SolverHints(hessian=value), "hessian"),
     ],

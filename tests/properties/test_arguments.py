@@ -26,7 +26,7 @@ WRONG: tuple[Any, ...] = (
     type,
 )
 PROBLEM = load("walk12")
-OBJECTIVE = compile_objective(PROBLEM, threads=1)
+OBJECTIVE = compile_objective(PROBLEM)
 PSO = search.ParticleSwarm(population=5)
 
 
@@ -45,7 +45,6 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "solver": (lambda value: solve(PROBLEM, solver=value), (None,)),
     "progress": (lambda value: solve(PROBLEM, progress=value), (None, type)),
     "problem of compile_objective": (compile_objective, ()),
-    "threads": (lambda value: compile_objective(PROBLEM, threads=value), (None,)),
     "lanes": (lambda value: compile_objective(PROBLEM, lanes=value), (None,)),
     "require_compiler": (lambda value: compile_objective(PROBLEM, require_compiler=value), (True,)),
     "problem by name": (load, ()),

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.humanoid.body import compute_residuals, count_newton_steps
-from nlp_gait.gaits.nao.joints import LEG_JOINTS, measure_leg
+from nlp_gait.gaits.nao.body import LEG_JOINTS, measure_leg
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.robots.leg import Leg

@@ -8,7 +8,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.nao.joints import LEG_JOINTS
+from nlp_gait.gaits.nao.body import LEG_JOINTS
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import forward_kinematics, leg_angles

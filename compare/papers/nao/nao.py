@@ -38,7 +38,7 @@ from compare.papers.nao.results import (
 from compare.papers.paper import DifferenceRow, Paper
 from compare.papers.paper_runs import evaluate_point
 from compare.papers.rules import Found
-from nlp_gait.gaits.nao.joints import measure_leg
+from nlp_gait.gaits.nao.body import measure_leg
 from nlp_gait.robots import load_robot
 
 KINDS = {"power": "power_W", "torque": "torque_change_Nm"}

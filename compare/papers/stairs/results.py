@@ -201,7 +201,7 @@ def tune_otherwise(spec: ProblemSpec, x: Sequence[float], evaluations: int) -> d
         margin = point["zmp_weight"] * assembly.indexes["zmp_margin_min_m"]
         return replace(assembly, objective=assembly.indexes["tracking_cost"] - margin)
 
-    objective = compile_objective(problem.derive(name="stairs-errors", change=drop_power), threads=1)
+    objective = compile_objective(problem.derive(name="stairs-errors", change=drop_power))
     tuned = minimize(objective, COLONY, evaluations=evaluations, seed=0).x
     points = {"without_power": tuned.tolist(), "upright": [*x[:2], np.pi / 2]}
     indexes = {name: evaluate(problem, point).indexes for name, point in points.items()}

@@ -1,15 +1,13 @@
 """A problem's exact functions as an objective for searches, for many candidates at once: compiled, or interpreted.
 
-Rows of a batch are divided among threads where that is worth it; without a compiler CasADi's virtual machine evaluates them.
+Several threads may call one objective at once. Without a compiler CasADi's virtual machine evaluates the rows.
 """
 
 import ctypes
 import logging
 import os
 import threading
-import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
 from random import Random
 from typing import Any, Literal
@@ -106,46 +104,10 @@ class InterpretedRows:
                     output[cut] = value
 
 
-# Least work of a thread; handing over work costs about 0.05 ms.
-LEAST_THREAD_TIME_S = 3e-4
-
-
-class RowThreads:
-    """Divides batches among threads, by the time that a row took in the last batch."""
-
-    def __init__(self, threads: int) -> None:
-        """Use at most this number of threads."""
-        self._threads = threads
-        self._time_per_row_s = 0.0
-        self._pools: dict[int, ThreadPoolExecutor] = {}
-
-    def run(self, rows: int, evaluate: Callable[[slice], None]) -> None:
-        """Call ``evaluate`` with slices that together are all rows, from several threads at once."""
-        count = max(1, min(self._threads, int(rows * self._time_per_row_s / LEAST_THREAD_TIME_S)))
-        started = time.perf_counter()
-        cuts = [slice(rows * i // count, rows * (i + 1) // count) for i in range(count)]
-        jobs = [self._get_pool().submit(evaluate, cut) for cut in cuts[1:]]
-        evaluate(cuts[0])
-        if jobs:
-            wait(jobs)
-        for job in jobs:
-            job.result()
-        if rows:
-            self._time_per_row_s = (time.perf_counter() - started) * count / rows
-
-    def _get_pool(self) -> ThreadPoolExecutor:
-        pools, process = self._pools, os.getpid()  # a forked process has no threads of its parent, and starts its own
-        if process not in pools:
-            # Two threads at once may start two pools; the one that is overwritten ends with its work.
-            self._pools = pools = {process: ThreadPoolExecutor(self._threads - 1, thread_name_prefix="nlp-gait")}
-        return pools[process]
-
-
 # Detects a wrong library, not rounding: compiled and interpreted values agree to about 1e-12.
 CHECK_TOLERANCE = 1e-6
 CHECK_POINTS = 5
 LANE_COUNTS = (1, 2, 4, 8)
-MOST_THREADS = 1024
 
 
 class CompiledObjective:
@@ -158,7 +120,6 @@ class CompiledObjective:
         self,
         problem: GaitProblem,
         evaluate_rows: NativeRows | InterpretedRows,
-        threads: int,
         rebuild: Callable[..., "CompiledObjective"],
     ) -> None:
         """Use ``compile_objective`` instead; ``rebuild`` makes this objective from its problem."""
@@ -173,7 +134,6 @@ class CompiledObjective:
         self._shared = (np.array(problem.p), *model.row_bounds(problem), 1.0 / model.row_scales)
         #: (m - n,) names of the rows without their places, those of the variables left out
         self.groups = model.row_groups[: -len(self.names)]
-        self._threads = RowThreads(threads)
         self._rebuild = rebuild
         self._local = threading.local()
 
@@ -220,11 +180,7 @@ class CompiledObjective:
         return self._rebuild, (self.problem,)
 
     def _evaluate(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
-        def evaluate(cut: slice) -> None:
-            outputs = (f[cut], None if g is None else g[cut], violation[cut])
-            self._evaluate_rows((X[cut], *self._shared), SHARED, outputs, cut.stop - cut.start)
-
-        self._threads.run(len(X), evaluate)
+        self._evaluate_rows((X, *self._shared), SHARED, (f, g, violation), len(X))
 
     def _check(self, X: object) -> Array:
         if isinstance(X, Mapping):
@@ -237,7 +193,7 @@ class CompiledObjective:
 
 
 def compile_objective(
-    problem: GaitProblem, *, require_compiler: bool = False, threads: int | None = None, lanes: int | None = None
+    problem: GaitProblem, *, require_compiler: bool = False, lanes: int | None = None
 ) -> CompiledObjective:
     """Return the exact objective and violation of a problem for batches of candidates.
 
@@ -246,7 +202,6 @@ def compile_objective(
     Args:
         problem: with the parameter values to use.
         require_compiler: raise rather than fall back to the interpreter.
-        threads: largest number of threads for a large batch; None for all cores. Results do not depend on it.
         lanes: candidates that one instruction works on, 1, 2, 4 or 8; None for what the CPU does best.
 
     Raises InputError for a count that is not allowed or a problem that is not searchable; CompilerError for ``require_compiler``.
@@ -258,7 +213,6 @@ def compile_objective(
     if not problem.searchable:
         n = len(problem.names)
         raise InputError(f"{problem.name} has {n} variables tied by equations, which no search can satisfy; use solve")
-    used = available_cores() if threads is None else check_count("threads", threads, at_most=MOST_THREADS)
     if lanes is not None and check_count("lanes", lanes) not in LANE_COUNTS:
         raise InputError(f"lanes must be 1, 2, 4 or 8, got {lanes}")
     evaluate_rows: NativeRows | InterpretedRows
@@ -270,9 +224,8 @@ def compile_objective(
         slow = "the objective is interpreted, which is many times slower: %s"
         logging.getLogger("nlp_gait").warning(slow, error)
         evaluate_rows = problem.build_once(InterpretedRows)
-        used = 1  # the virtual machine does not release Python's lock
-    rebuild = partial(compile_objective, require_compiler=require_compiler, threads=threads, lanes=lanes)
-    return CompiledObjective(problem, evaluate_rows, used, rebuild)
+    rebuild = partial(compile_objective, require_compiler=require_compiler, lanes=lanes)
+    return CompiledObjective(problem, evaluate_rows, rebuild)
 
 
 def _build_native(problem: GaitProblem, compiler: Compiler, lanes: int) -> NativeRows:

@@ -96,7 +96,7 @@ class _Functions:
         self._problem = problem
         self._limits = limits
         self._stop = stop
-        self._objective = compile_objective(problem, threads=1)
+        self._objective = compile_objective(problem)
         self.backend = self._objective.backend
         model = build_exact_model(problem)
         values = model.at(problem.lower, problem.p)

@@ -1,29 +1,129 @@
-"""A walking cycle as one problem: rows of both phases, changes of torques at the switches, energy and speed."""
+"""A walking cycle as one problem: its motion, rows of both phases, changes of torques at the switches, energy and speed."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
-from casadi import MX
+from casadi import DM, MX, SX, fmax, vertcat, vertsplit
 
-from nlp_gait.formulation import Array, Assembly, GaitProblem, Grid, Signals, SolverHints, Start
-from nlp_gait.formulation.assembly import Objective, Parameter, Point, Variable, make_parameters
+from nlp_gait.formulation import Array, Assembly, GaitProblem, Grid, InstantPoint, Signals, SolverHints, Start, Variable
+from nlp_gait.formulation.assembly import Objective, Parameter, Point, make_parameters
 from nlp_gait.formulation.gait_problem import draw_uniform
-from nlp_gait.gaits.biped.body import TIMES, Body, Support
-from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, make_cycle_planners, make_cycle_variables
+from nlp_gait.gaits.biped.body import (
+    LIFT,
+    TIMES,
+    Angles,
+    Body,
+    Support,
+    make_lift_variable,
+    make_time_variable,
+    read_duration,
+)
 from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import BalanceMargins, Box, compute_margins, make_rows
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, compute_margins, make_rows
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase, make_start_within_reach
-from nlp_gait.gaits.biped.samples import Loader
-from nlp_gait.gaits.biped.sequence import BALANCE, ENERGY_PER_METRE, End, MotionSection, Sequence
-from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
-from nlp_gait.gaits.biped.switch import TORQUE_JUMP, limit_torque_jump
+from nlp_gait.gaits.biped.samples import Instant, Loader, Planner
+from nlp_gait.gaits.biped.sequence import (
+    BALANCE,
+    ENERGY_PER_METRE,
+    SWITCHES,
+    TORQUE_JUMP,
+    End,
+    MotionSection,
+    Sequence,
+    SwitchState,
+    limit_torque_jump,
+    make_state_variables,
+    read_state,
+)
+from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box, swing_foot
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion, cubic, stack
+
+STEP_SHARES = (0.1, 0.6)  # of a leg's length; generous, so that reach decides
+STEP = "step_length_m"
+LEAST_STEP = 1e-3  # [m]; a shorter step is evaluated as this one, so that the path of the swing foot stays defined
+
+
+class PhaseMotion(NamedTuple):
+    """A phase of a walk over the left foot, which stands at x = 0: from state to state while the right foot swings or stands."""
+
+    start: SwitchState
+    end: SwitchState
+    duration: SX  # [s]
+    foot: Motion  # ankle (3,) of the right foot [m]
+    turns: Angles = {}  # of torso and right foot, if they turn
+
+
+def make_cycle_variables(body: Body) -> tuple[Variable, ...]:
+    """Return the variables of a cycle, most with the bounds of the phases; the step length is the last one."""
+    states = [variable for switch in SWITCHES for variable in make_state_variables(body, switch, switch)]
+    low, high = (round(share * body.leg_length_m, 3) for share in STEP_SHARES)
+    step = Variable(name=STEP, unit="m", lower=low, upper=high, description="from foot to foot")
+    return (
+        *states,
+        make_lift_variable(body),
+        make_time_variable(body, Support.SINGLE),
+        make_time_variable(body, Support.DOUBLE),
+        step,
+    )
+
+
+def make_cycle_planners(body: Body) -> dict[Support, Planner]:
+    """Return the plans of both phases, which are continuous at touch-down."""
+    images = DM([c.image for c in body.coordinates])
+    mirror = SX([1, -1, 1])
+
+    def read(point: InstantPoint) -> tuple[SwitchState, SwitchState, SX]:
+        """States at lift-off and touch-down, and the step length [m]."""
+        lift_off, landed = (read_state(point, switch, body.coordinates) for switch in SWITCHES)
+        return lift_off, landed, fmax(point[STEP], LEAST_STEP)
+
+    def single(point: InstantPoint, phase: SX) -> PhaseMotion:
+        lift_off, landed, step = read(point)
+        duration = read_duration(point, Support.SINGLE)
+        foot = swing_foot(-step, step, *body.ankle("R"), point[LIFT], duration, phase)
+        return PhaseMotion(lift_off, landed, duration, foot)
+
+    def double(point: InstantPoint, phase: SX) -> PhaseMotion:
+        (hip, velocity, angles, rates), landed, step = read(point)
+        place = mirror * hip + vertcat(step, 0, 0)  # the mirror image of lift-off, a step further
+        end = SwitchState(place, mirror * velocity, images * angles, images * rates)
+        return PhaseMotion(landed, end, read_duration(point, Support.DOUBLE), body.standing_ankle("R", step))
+
+    return {Support.SINGLE: make_planner(body, single), Support.DOUBLE: make_planner(body, double)}
+
+
+def make_planner(body: Body, read: Callable[[InstantPoint, SX], PhaseMotion]) -> Planner:
+    """Return the plan of a phase over the left foot from a function of its point and its time, a share of the duration."""
+    left = body.standing_ankle("L")
+
+    def plan(point: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+        motion = read(point, phase)
+        hip, angles = interpolate_states(motion.start, motion.end, motion.duration, phase)
+        turned = {**body.cycle_angles(angles), **motion.turns}
+        return body.plan(hip, turned, {"L": left, "R": motion.foot}, point[REACH_MARGIN], ops)
+
+    return plan
+
+
+def interpolate_states(
+    start: SwitchState, end: SwitchState, duration: SX, phase: SX
+) -> tuple[Motion, tuple[Motion, ...]]:
+    """Motion of the hip (3,) [m] and of every coordinate [rad] from state to state."""
+
+    def curves(*ends: SX) -> tuple[Motion, ...]:
+        columns = zip(*map(vertsplit, ends), strict=True)
+        return tuple(cubic(a, b, va, vb, duration, phase) for a, b, va, vb in columns)
+
+    hip = curves(start.hip, end.hip, start.hip_velocity, end.hip_velocity)
+    return stack(*hip), curves(start.angles, end.angles, start.angle_rates, end.angle_rates)
+
 
 SPEED = "speed_m_s"
 SPEED_M_S = 0.03  # default, of NAO

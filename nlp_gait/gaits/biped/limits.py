@@ -11,8 +11,8 @@ from casadi import DM, MX
 
 from nlp_gait.errors import unknown
 from nlp_gait.formulation import Constraint, InstantPoint, Over, Parameter, Point
+from nlp_gait.formulation.assembly import make_labels
 from nlp_gait.formulation.assembly import make_parameters as table
-from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.samples import BOTH_FEET, CORNERS, Quantity, Samples
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth

@@ -1,17 +1,20 @@
-"""Options of the problems of bipeds, each declared and explained once, and how the phases' problems are made of them."""
+"""Options of the problems of bipeds, each declared and explained once, and how phases, cycles and walks are made of them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Grid
 from nlp_gait.formulation.added_limits import AddedLimits
-from nlp_gait.formulation.assembly import Quadrature
 from nlp_gait.gaits.biped.body import Body, Support
 from nlp_gait.gaits.biped.curves import Trajectory
+from nlp_gait.gaits.biped.cycle import CycleObjective, make_cycle_problem, make_walking_cycle
+from nlp_gait.gaits.biped.footholds import Flight, parse_footholds
 from nlp_gait.gaits.biped.goals import Criterion
 from nlp_gait.gaits.biped.loads import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.phase_problem import make_goal, make_phase_problem
 from nlp_gait.gaits.biped.support_phases import make_support_phase
+from nlp_gait.gaits.biped.walk import plan_footstep_walk, plan_straight_walk
 
 SPLINE_SAMPLES = 4  # default samples in each interval of a spline, which can bend between 11 samples; a cubic cannot
 
@@ -61,21 +64,6 @@ class GridOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SampleOptions(GridOptions):
-    """Samples of a phase, and the rule of means.
-
-    Attributes:
-        rule: of means over time: trapezoid, with the mean margins over samples, as in the paper; or simpson
-    """
-
-    rule: Quadrature = "trapezoid"
-
-    def make_grid(self, trajectory: Trajectory = "cubic") -> Grid:
-        """Return the samples, which suit the trajectory, with the rule."""
-        return replace(super().make_grid(trajectory), rule=self.rule)
-
-
-@dataclass(frozen=True, kw_only=True)
 class StepOptions:
     """A step of one phase, and its curves.
 
@@ -89,7 +77,7 @@ class StepOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PhaseOptions(StepOptions, SampleOptions):
+class PhaseOptions(StepOptions, GridOptions):
     """A phase as in the paper.
 
     Attributes:
@@ -122,3 +110,58 @@ def make_support_problem(
     grid = options.make_grid(options.trajectory)
     phase = make_support_phase(body, kind, step_m, options.trajectory, grid, goal, loader, derivatives)
     return make_phase_problem(kind, f"on {legs}: {minimised}", phase)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycleOptions(GridOptions, LoadOptions):
+    """One step, whose mirror image is the next one.
+
+    Attributes:
+        objective: what is minimised: energy per metre, which leaves the speed free; or power, or torque, the mean of the sum of
+            squared torques, at the speed ``speed_m_s``, a parameter: the step length is then speed times the time of the cycle
+    """
+
+    objective: CycleObjective = "energy-per-metre"
+
+
+@dataclass(frozen=True, kw_only=True)
+class WalkOptions(GridOptions):
+    """A walk from standing to standing: weight shift, half step, steps, half step, weight shift.
+
+    All inner steps are one cycle, whose speed may have limits, which are parameters.
+
+    Attributes:
+        steps: swings of a foot; the first and the last one are half steps, so that the feet advance by one step length less
+        slope_deg: by which the ground rises forward; all places are in its axes, in which gravity is tilted
+        footholds: rows ``x,y,z,yaw`` [m, degrees], separated by semicolons: where the right foot, the left foot and so on land
+            instead; every step then has its own states
+    """
+
+    steps: int = 10
+    slope_deg: float = 0.0
+    footholds: str = ""
+
+
+def plan_cycle(body: Body, options: CycleOptions) -> GaitProblem:
+    """Return the problem of a cycle."""
+    goal = make_goal(body, "torque" if options.objective == "torque" else "power")
+    cycle = make_walking_cycle(
+        body,
+        make_divided_loads(body, options.torso_share),
+        options.make_grid(),
+        goal,
+        at_given_speed=options.objective != "energy-per-metre",
+    )
+    return make_cycle_problem(cycle)
+
+
+def plan_walk(body: Body, options: WalkOptions, flight: Flight | None = None) -> GaitProblem:
+    """Return the problem of a whole walk, on a slope, up a flight of stairs or along footholds; raises InputError."""
+    body, grid = body.tilt_ground(options.slope_deg), options.make_grid()
+    if not options.footholds:
+        return plan_straight_walk(body, options.steps, grid, flight)
+    if options.slope_deg or flight:
+        raise InputError("footholds are on a level floor; leave out slope_deg and the sizes of stairs")
+    places = parse_footholds(options.footholds)
+    body.check_footholds(places)
+    return plan_footstep_walk(body, places, options.steps, grid)

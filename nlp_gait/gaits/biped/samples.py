@@ -141,12 +141,12 @@ class Samples:
         return int(self.progress.shape[1]) - 1
 
     def average(self, values: MX) -> MX:
-        """Compute the means of rows (m, N + 1) over time by the grid's rule."""
+        """Compute the means of rows (m, N + 1) over time by the trapezoidal rule."""
         return values @ DM(self.grid.weights)
 
     def average_margins(self, values: MX) -> MX:
-        """Compute the mean of balance margins (1, N + 1), by default over samples, all alike, as the paper does."""
-        return ca.sum2(values) / (self.steps + 1) if self.grid.rule == "trapezoid" else self.average(values)
+        """Compute the mean of balance margins (1, N + 1) over samples, all alike, as the paper does."""
+        return ca.sum2(values) / (self.steps + 1)
 
     @property
     def step_s(self) -> MX:

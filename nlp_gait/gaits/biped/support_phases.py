@@ -9,8 +9,16 @@ from typing import NamedTuple, TypeAlias
 from casadi import MX, SX
 
 from nlp_gait.formulation import Array, Grid, InstantPoint, Point
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support, read_duration
-from nlp_gait.gaits.biped.bounds import make_hip_variables, make_lift_variable, make_time_variable
+from nlp_gait.gaits.biped.body import (
+    LIFT,
+    TIMES,
+    Body,
+    Support,
+    make_hip_variables,
+    make_lift_variable,
+    make_time_variable,
+    read_duration,
+)
 from nlp_gait.gaits.biped.curves import Trajectory, move_hip
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides
 from nlp_gait.gaits.biped.goals import Goal

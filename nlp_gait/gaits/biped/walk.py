@@ -17,18 +17,15 @@ from casadi import MX, SX
 from nlp_gait.errors import InputError, check_count
 from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Grid, Point, Signals, SolverHints, Variable
 from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter, make_parameters
-from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body, Support
-from nlp_gait.gaits.biped.bounds import make_lift_variable
-from nlp_gait.gaits.biped.cycle import make_cycle_margins
-from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner
-from nlp_gait.gaits.biped.flight import Flight
-from nlp_gait.gaits.biped.footholds import Foothold, list_feet
+from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body, Support, make_lift_variable
+from nlp_gait.gaits.biped.cycle import STEP, PhaseMotion, make_cycle_margins, make_planner
+from nlp_gait.gaits.biped.footholds import Flight, Foothold, list_feet
 from nlp_gait.gaits.biped.limits import BalanceMargins, RowsAndIndexes
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_goal, make_phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Planner
-from nlp_gait.gaits.biped.sequence import End, MotionSection
+from nlp_gait.gaits.biped.sequence import End, MotionSection, read_state
 from nlp_gait.gaits.biped.sequence import Sequence as PhaseSequence
 from nlp_gait.gaits.biped.support_phases import (
     compute_sole_margins,
@@ -37,7 +34,6 @@ from nlp_gait.gaits.biped.support_phases import (
     limit_to_sole,
     make_support_box,
 )
-from nlp_gait.gaits.biped.switch import read_state
 from nlp_gait.gaits.biped.walk_sections import (
     DURATION,
     HALF_STEPS,

@@ -15,12 +15,10 @@ from importlib.resources import files
 import numpy as np
 
 from nlp_gait.formulation import Array, GaitProblem, Variable
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
-from nlp_gait.gaits.biped.bounds import make_lift_variable, make_usual_bounds
-from nlp_gait.gaits.biped.cycle_motion import STEP, make_cycle_variables
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support, make_lift_variable, make_usual_bounds
+from nlp_gait.gaits.biped.cycle import STEP, make_cycle_variables
 from nlp_gait.gaits.biped.footholds import Foothold, list_swings
-from nlp_gait.gaits.biped.sequence import End, MotionSection, State
-from nlp_gait.gaits.biped.switch import make_state_variables
+from nlp_gait.gaits.biped.sequence import End, MotionSection, State, make_state_variables
 
 STAND, STAND_AT_END = Support.STAND.value, "stand_at_end"  # first pose, and state of its variables; last pose
 SHIFT = "shift_time_s"

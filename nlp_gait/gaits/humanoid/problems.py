@@ -4,9 +4,17 @@ from dataclasses import dataclass
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
-from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
-from nlp_gait.gaits.biped.problems import LoadOptions, MotorOptions, PhaseOptions, make_support_problem
-from nlp_gait.gaits.biped.walking import CycleOptions, WalkOptions, plan_cycle, plan_walk
+from nlp_gait.gaits.biped.footholds import CLEARANCE_M, Flight
+from nlp_gait.gaits.biped.problems import (
+    CycleOptions,
+    LoadOptions,
+    MotorOptions,
+    PhaseOptions,
+    WalkOptions,
+    make_support_problem,
+    plan_cycle,
+    plan_walk,
+)
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 
 

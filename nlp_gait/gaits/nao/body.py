@@ -1,8 +1,9 @@
 """NAO as its gaits take it: its joints, its closed-form legs under an upright torso, the swing of its arms, its motors."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from casadi import DM, MX, SX, fmax, vertcat, vertsplit
@@ -15,12 +16,90 @@ from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.limits import ArmLimits, Limit, Margins, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import Instant, Samples
-from nlp_gait.gaits.nao import joints as nao_joints
-from nlp_gait.robots import Robot, load_robot
+from nlp_gait.robots import Joint, Robot, load_robot
+from nlp_gait.robots.robot import Vector
 from nlp_gait.robots.tree import find_partner, make_point_masses, weld
-from nlp_gait.symbolic.kinematics import leg_angles
+from nlp_gait.symbolic.kinematics import FORWARD, TO_THE_LEFT, leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
+
+LEG_JOINTS = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
+ARM_JOINTS = ("ShoulderPitch", "ShoulderRoll", "ElbowYaw", "ElbowRoll", "WristYaw")
+YAW_PITCHES = ("LHipYawPitch", "RHipYawPitch")  # one motor turns both
+# Joints that enter the power (eq. 32): both legs with the hip yaw-pitch, and both arms.
+JOINTS = tuple(
+    f"{side}{joint}" for names in (("HipYawPitch", *LEG_JOINTS), ARM_JOINTS) for side in "LR" for joint in names
+)
+PLANNED_JOINTS = tuple(f"{side}{joint}" for side in "LR" for joint in LEG_JOINTS)
+KNEES = ("LKneePitch", "RKneePitch")
+# Section 3.1 [rad].
+HELD_ARM_ANGLES = {
+    "LShoulderRoll": 0.26,
+    "RShoulderRoll": -0.26,
+    "LElbowYaw": -1.5,
+    "RElbowYaw": 1.5,
+    "LWristYaw": 0.0,
+    "RWristYaw": 0.0,
+}
+# All joints of arms that do not swing: in the middle of Table 3.
+RESTING_ARM_ANGLES = HELD_ARM_ANGLES | {
+    "LShoulderPitch": 1.5,
+    "RShoulderPitch": 1.5,
+    "LElbowRoll": -0.53,
+    "RElbowRoll": 0.53,
+}
+
+# The axis about which each joint must turn.
+AXES = dict(zip(LEG_JOINTS, (FORWARD, TO_THE_LEFT, TO_THE_LEFT, TO_THE_LEFT, FORWARD), strict=True))
+CROSSING = ("HipPitch", "AnkleRoll")  # joints whose axis crosses that of the joint before them
+BELOW = ("KneePitch", "AnklePitch")  # joints that are straight below the one before them
+
+# Published axes and origins are rounded: 1e-3 rad and 0.1 mm move a foot by less than the 4 mm by which margins reproduce.
+AXIS_TOLERANCE, ORIGIN_TOLERANCE_M = 1e-3, 1e-4
+
+
+class LegGeometry(NamedTuple):
+    """Lengths of one leg."""
+
+    hip_m: Vector  # (3,) centre of the hip joints from the torso's origin
+    thigh_m: float  # hip to knee
+    tibia_m: float  # knee to ankle
+    ankle_height_m: float  # ankle above the ground
+
+
+def measure_leg(robot: Robot, side: str) -> LegGeometry:
+    """Measure the leg on side ``"L"`` or ``"R"``; raises InputError if the closed form does not solve it, or UnknownNameError."""
+    joints = {name: robot.joint(f"{side}{name}") for name in ("HipYawPitch", *LEG_JOINTS)}
+    above = robot.root
+    for name, joint in joints.items():
+        if (wrong := _find_misfit(name, joint, above)) is not None:
+            raise InputError(
+                f"robot {robot.name!r}, joint {joint.name!r}: its {wrong}. The legs that are solved in closed form are chains "
+                f"{' - '.join(joints)} from the torso, whose hips and ankles have no offsets"
+            )
+        above = joint.child
+    name = "left" if side == "L" else "right"
+    foot = robot.feet[name]
+    if foot.link != above:
+        raise InputError(f"robot {robot.name!r}, foot {name!r}: its link must be {above!r}, got {foot.link!r}")
+    yaw, roll, _, knee, ankle, _ = (joint.origin_m for joint in joints.values())
+    hip = yaw[0] + roll[0], yaw[1] + roll[1], yaw[2] + roll[2]
+    return LegGeometry(hip, -knee[2], -ankle[2], foot.ankle_height_m)
+
+
+def _find_misfit(name: str, joint: Joint, above: str) -> str | None:
+    """Return what is wrong with a joint of a leg that is carried by link ``above``; None if nothing is."""
+    x, y, z = joint.origin_m
+    if joint.parent != above:
+        return f"parent must be link {above!r}, got {joint.parent!r}"
+    if name in AXES and math.dist(joint.axis, AXES[name]) > AXIS_TOLERANCE:
+        return f"axis must be {list(AXES[name])} (x forward, y left, z up, at zero angles), got {list(joint.axis)}"
+    if name in CROSSING and math.hypot(x, y, z) > ORIGIN_TOLERANCE_M:
+        return f"axis must cross that of the joint before it, origin_m [0, 0, 0]; got {[x, y, z]}"
+    if name in BELOW and (math.hypot(x, y) > ORIGIN_TOLERANCE_M or not z < 0.0):
+        return f"place must be straight below the joint before it, origin_m [0, 0, -length]; got {[x, y, z]}"
+    return None
+
 
 Arms = Literal["carried", "separate", "shared", "held"]
 
@@ -69,13 +148,13 @@ def lock_unused_joints(loaded: Robot) -> Robot:
     joints that the gait moves, or if the closed form does not solve its legs.
     """
     try:
-        for joint in nao_joints.JOINTS:
+        for joint in JOINTS:
             loaded.joint(joint)
     except UnknownNameError as error:
         raise InputError(f"robot {loaded.name!r} does not suit the NAO problems: {error}") from error
-    welded = weld(loaded, [joint for joint in loaded.joints if joint not in nao_joints.JOINTS])
+    welded = weld(loaded, [joint for joint in loaded.joints if joint not in JOINTS])
     for side in "LR":
-        nao_joints.measure_leg(welded, side)
+        measure_leg(welded, side)
     return welded
 
 
@@ -83,15 +162,13 @@ def move_arms(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX)
     """Return the joint motions of both arms: those in ``swing`` as cubics from rest to rest [rad], the others held."""
     still = SX(0)
     moved = {name: cubic(SX(a), SX(b), still, still, duration, phase) for name, (a, b) in swing.items()}
-    return {name: constant_motion(angle) for name, angle in nao_joints.HELD_ARM_ANGLES.items()} | moved
+    return {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()} | moved
 
 
 def parse_nao_motors(text: str, robot: Robot) -> Motors:
     """Return the features of NAO's motors that an option's text lists."""
     features, coupling = parse_features(text), AnkleCoupling()
-    return Motors(
-        features=features, robot=robot, joints=nao_joints.JOINTS, shared=nao_joints.YAW_PITCHES, coupling=coupling
-    )
+    return Motors(features=features, robot=robot, joints=JOINTS, shared=YAW_PITCHES, coupling=coupling)
 
 
 class AnkleCoupling(Limit):
@@ -144,7 +221,7 @@ class NaoBody(Body):
     def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:
         """Return the joints of both arms, which swing against each other; elbows bend as their shoulders move."""
         (swing,) = coordinates
-        middle = nao_joints.RESTING_ARM_ANGLES
+        middle = RESTING_ARM_ANGLES
         return {
             name: Motion(middle[name] + factor * swing.position, factor * swing.velocity, factor * swing.acceleration)
             for name, factor in PER_SHOULDER.items()
@@ -155,16 +232,16 @@ class NaoBody(Body):
         joints: dict[str, Motion] = {}
         reach = []
         for side, ankle in ankles.items():
-            geometry = nao_joints.measure_leg(self.robot, side)
+            geometry = measure_leg(self.robot, side)
             (ankle_at, *rates), (hip_at, *hip_rates) = ankle, hip
             moving = (a - b for a, b in zip(rates, hip_rates, strict=True))
             hip_to_ankle = Motion(ankle_at - hip_at - DM(geometry.hip_m), *moving)
             leg = leg_angles(hip_to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
-            rows = (Motion(*(order[i] for order in leg.joints)) for i in range(len(nao_joints.LEG_JOINTS)))
+            rows = (Motion(*(order[i] for order in leg.joints)) for i in range(len(LEG_JOINTS)))
             joints |= {f"{side}HipYawPitch": constant_motion(0.0)}
-            joints |= {f"{side}{name}": row for name, row in zip(nao_joints.LEG_JOINTS, rows, strict=True)}
+            joints |= {f"{side}{name}": row for name, row in zip(LEG_JOINTS, rows, strict=True)}
             reach.append(leg.reach)
-        joints |= {name: constant_motion(angle) for name, angle in nao_joints.RESTING_ARM_ANGLES.items()}
+        joints |= {name: constant_motion(angle) for name, angle in RESTING_ARM_ANGLES.items()}
         places = {side: ankle.position for side, ankle in ankles.items()}
         return Instant(
             joints={**joints, **angles},
@@ -224,22 +301,22 @@ def make_nao(
     """
     full = load_robot(robot)
     simulated = lock_unused_joints(full)
-    left, right = (nao_joints.measure_leg(simulated, side) for side in "LR")
+    left, right = (measure_leg(simulated, side) for side in "LR")
     leg_length = left.thigh_m + left.tibia_m
     ground = left.ankle_height_m - left.hip_m[2]
     lowest, highest = (round(ground + share * leg_length, 3) for share in HEIGHT_SHARES)
-    hips = (simulated.joint(name).child for name in nao_joints.YAW_PITCHES)
-    separate = tuple(side + joint for side in "LR" for joint in nao_joints.ARM_JOINTS)
+    hips = (simulated.joint(name).child for name in YAW_PITCHES)
+    separate = tuple(side + joint for side in "LR" for joint in ARM_JOINTS)
     return NaoBody(
         family="nao",
         title="NAO",
         full=full,
         simulated=simulated,
         motors=parse_nao_motors(motors, simulated if rotational_inertia else make_point_masses(simulated)),
-        joints=nao_joints.JOINTS,
-        planned=nao_joints.PLANNED_JOINTS,
-        images=tuple(map(find_partner, nao_joints.JOINTS)),
-        leg_joints={side: tuple(joint for joint in nao_joints.JOINTS if joint.startswith(side)) for side in "LR"},
+        joints=JOINTS,
+        planned=PLANNED_JOINTS,
+        images=tuple(map(find_partner, JOINTS)),
+        leg_joints={side: tuple(joint for joint in JOINTS if joint.startswith(side)) for side in "LR"},
         coordinates=(ARM_COORDINATE,),
         # Torso, soles, and hips whose yaw-pitch joint is held at zero keep the world's axes.
         upright=frozenset((simulated.root, *hips, *(foot.link for foot in simulated.feet.values()))),

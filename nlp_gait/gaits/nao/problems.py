@@ -8,8 +8,16 @@ from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.gaits.biped.body import ZmpGravity, ZmpMasses
 from nlp_gait.gaits.biped.loads import Division
 from nlp_gait.gaits.biped.phase import Derivatives
-from nlp_gait.gaits.biped.problems import LoadOptions, MotorOptions, PhaseOptions, make_support_problem
-from nlp_gait.gaits.biped.walking import CycleOptions, WalkOptions, plan_cycle, plan_walk
+from nlp_gait.gaits.biped.problems import (
+    CycleOptions,
+    LoadOptions,
+    MotorOptions,
+    PhaseOptions,
+    WalkOptions,
+    make_support_problem,
+    plan_cycle,
+    plan_walk,
+)
 from nlp_gait.gaits.nao.body import Arms, NaoBody, make_nao
 
 STEP_M = 0.06
@@ -22,7 +30,6 @@ PROVEN_OPTIONS = {
     "arms": "carried",
     "zmp_gravity": "physical",
     "zmp_masses": 25,
-    "rule": "trapezoid",
 }
 
 

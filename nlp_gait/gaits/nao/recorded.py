@@ -10,20 +10,17 @@ from casadi import MX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint, GaitProblem, Grid, Parameter, Point, SolverHints, load
-from nlp_gait.formulation.assembly import Variable
-from nlp_gait.formulation.blocks import make_labels
+from nlp_gait.formulation.assembly import Variable, make_labels
 from nlp_gait.formulation.signals import JointAngles
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Support
-from nlp_gait.gaits.biped.bounds import make_hip_variables, make_lift_variable, make_time_variable
-from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins
-from nlp_gait.gaits.biped.cycle_motion import STEP, make_cycle_variables
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Support, make_hip_variables, make_lift_variable, make_time_variable
+from nlp_gait.gaits.biped.cycle import STEP, WalkingCycle, make_cycle_margins, make_cycle_variables
 from nlp_gait.gaits.biped.limits import BalanceMargins, Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.loads import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase, make_phase_problem
 from nlp_gait.gaits.biped.samples import CORNERS, Samples
+from nlp_gait.gaits.biped.sequence import SWITCHES
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
-from nlp_gait.gaits.biped.switch import SWITCHES
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.gaits.nao.recorded_motion import FINE, RecordedMotion, make_places_function, read_motion
 from nlp_gait.gaits.nao.recorded_phase import GROUND_TOLERANCE, RecordedPhase

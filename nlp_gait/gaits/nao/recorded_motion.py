@@ -16,7 +16,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import Body, Support
-from nlp_gait.gaits.nao.joints import JOINTS, RESTING_ARM_ANGLES
+from nlp_gait.gaits.nao.body import JOINTS, RESTING_ARM_ANGLES
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import forward_kinematics

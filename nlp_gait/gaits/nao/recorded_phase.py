@@ -13,7 +13,7 @@ from nlp_gait.formulation import NumericPoint, Point, Signals
 from nlp_gait.formulation.assembly import Parameter, RowsOverTime
 from nlp_gait.gaits.biped.phase import IN_TIME, Phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Planner, Quantity, SampledMotion
-from nlp_gait.gaits.nao.joints import KNEES
+from nlp_gait.gaits.nao.body import KNEES
 from nlp_gait.gaits.nao.recorded_motion import RecordedMotion, locate_free_parts
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.tape import simplify

@@ -15,7 +15,6 @@ from nlp_gait.formulation.assembly import (
     NumericPoint,
     Objective,
     Point,
-    Quadrature,
     RowsOverTime,
     Variable,
     make_parameters,
@@ -91,7 +90,6 @@ def stairs_plan(
     angle_limits: bool = True,
     shanks: Shanks = "free",
     intervals: int = 40,
-    rule: Quadrature = "trapezoid",
 ) -> GaitProblem:
     """Return the planner of one step.
 
@@ -103,7 +101,6 @@ def stairs_plan(
         angle_limits: whether angles of links and knees are limited; the paper gives no limits.
         shanks: free, as printed, or limited: both shanks stay outside the steps.
         intervals: of the step, a quarter in each phase.
-        rule: of the energy's integral over each phase, trapezoid or simpson.
 
     Source:
         Bhardwaj et al., section V and Table III.
@@ -111,7 +108,7 @@ def stairs_plan(
     if intervals < len(PHASES) or intervals % len(PHASES):
         raise InputError(f"intervals must be a multiple of {len(PHASES)} (one part for each phase), got {intervals!r}")
     planned = PlannedStep(
-        phase_grid=Grid(intervals=intervals // len(PHASES), rule=rule),
+        phase_grid=Grid(intervals=intervals // len(PHASES)),
         balance=balance,
         angle_limits=angle_limits,
         shank_limits=shanks == "limited",

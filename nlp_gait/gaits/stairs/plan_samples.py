@@ -86,7 +86,7 @@ class PlannedStep:
         return self._map_samples(make_place_function(gaps, ops), point, *(grid or self.grid))
 
     def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
-        """Return the integral of sum |torque x rate| by the grid's rule, phase by phase [J]."""
+        """Return the integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
         power = ca.sum1(ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape))
         total, weights = MX(0), DM(self.phase_grid.weights)
         for first in self._phase_starts:

@@ -8,7 +8,7 @@ import casadi as ca
 from casadi import MX
 
 from nlp_gait.formulation import Columns, Constraint, Point, Variable, make_parameters, make_vector_columns
-from nlp_gait.formulation.blocks import make_labels
+from nlp_gait.formulation.assembly import make_labels
 from nlp_gait.gaits.stairs.planar_biped import JOINTS, MOVING, load_toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, list_shank_edges
 

@@ -13,8 +13,7 @@ from casadi import DM, SX
 
 from nlp_gait.gaits.biped.loads import Division, share_torso
 from nlp_gait.gaits.biped.support_phases import Point2, Stance, make_support_box, swing_foot
-from nlp_gait.gaits.nao.body import GRAVITY, move_arms
-from nlp_gait.gaits.nao.joints import ARM_JOINTS, LEG_JOINTS, measure_leg
+from nlp_gait.gaits.nao.body import ARM_JOINTS, GRAVITY, LEG_JOINTS, measure_leg, move_arms
 from nlp_gait.proofs.nao import world_frame
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.dynamics import Wrench, ground_load

@@ -17,8 +17,7 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.limits import SCALES
 from nlp_gait.gaits.biped.support_phases import place_hip, place_soles, place_stance
-from nlp_gait.gaits.nao.body import ARM_SWING
-from nlp_gait.gaits.nao.joints import measure_leg
+from nlp_gait.gaits.nao.body import ARM_SWING, measure_leg
 from nlp_gait.gaits.nao.problems import LeastPower
 from nlp_gait.proofs.nao.instants import PAIRS, PowerInstant, PowerPhase, make_double_support, make_single_support
 from nlp_gait.proofs.power_form import WIDENING, PowerForm, PowerRows

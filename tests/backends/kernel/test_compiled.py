@@ -1,4 +1,4 @@
-"""The compiled objective: the virtual machine's numbers at every lane count, whatever the batch, the threads or the memory."""
+"""The compiled objective: the virtual machine's numbers at every lane count, whatever the batch or the memory."""
 
 import functools
 from dataclasses import replace
@@ -32,7 +32,7 @@ def problem_named(name: str) -> GaitProblem:
 
 @functools.cache
 def read_objective(name: str, lanes: int | None = None) -> CompiledObjective:
-    return compile_objective(problem_named(name), require_compiler=True, lanes=lanes, threads=1)
+    return compile_objective(problem_named(name), require_compiler=True, lanes=lanes)
 
 
 def candidates(problem: GaitProblem, count: int = CANDIDATES, seed: int = 0) -> Array:
@@ -108,8 +108,6 @@ def test_says_which_shape_it_wants(X: Array) -> None:
 
 
 def test_refuses_impossible_settings() -> None:
-    with pytest.raises(InputError, match="threads must be a whole number >= 1 and <= 1024, got 0"):
-        compile_objective(problem_named("nao-ssp"), threads=0)
     with pytest.raises(InputError, match="lanes must be 1, 2, 4 or 8, got 3"):
         compile_objective(problem_named("nao-ssp"), lanes=3)
 
@@ -120,11 +118,11 @@ def test_parameters_change_without_a_new_library(monkeypatch: pytest.MonkeyPatch
     X = candidates(problem, 40)
     f, violation = before(X)
     monkeypatch.setattr("nlp_gait.backends.kernel.compiled.load_library", None)  # would raise if it were called
-    strict = compile_objective(problem.with_values(torque_change_limit_Nm=0.1, heat_loss_W_per_Nm2=0.05), threads=1)
+    strict = compile_objective(problem.with_values(torque_change_limit_Nm=0.1, heat_loss_W_per_Nm2=0.05))
     strict_f, strict_violation = strict(X)
     assert (strict_f > f).all() and (strict_violation > violation).all()
     assert np.array_equal(before(X)[0], f)
-    fixed = compile_objective(problem.fix(swing_height_m=0.024), threads=1)
+    fixed = compile_objective(problem.fix(swing_height_m=0.024))
     assert fixed.lower[7] == fixed.upper[7] == 0.024
     assert fixed.names == problem.names
     value = build_exact_model(problem).at(X[0], strict.problem.p).cost
@@ -227,7 +225,7 @@ def test_one_point_has_the_values_of_a_batch_of_one(compiled: bool) -> None:
     problem = toy(corner)
     objective = compile_objective(problem, require_compiler=True)
     if not compiled:
-        objective = CompiledObjective(problem, InterpretedRows(problem), 1, compile_objective)
+        objective = CompiledObjective(problem, InterpretedRows(problem), compile_objective)
     for x in ([0.0, 1.5], [2.5, 0.1], [np.nan, 0.0]):
         f, violation = objective(np.array([x]))
         assert objective.point(np.array(x)) == objective.point(x) == (f[0], violation[0])
@@ -249,7 +247,7 @@ def test_scalar_operations_agree_with_casadi_also_for_nan(lanes: int) -> None:
     )
     g = ca.vertcat(values, ca.if_else(x[0] < y[0], x[1] ** 2, 1 / y[1]))
     problem = nlp_gait.problem({"x": ca.veccat(x, y), "f": x[0], "g": g}, lbx=-2, ubx=2, lbg=-9)
-    objective = compile_objective(problem, require_compiler=True, lanes=lanes, threads=1)
+    objective = compile_objective(problem, require_compiler=True, lanes=lanes)
     points = np.random.default_rng(0).uniform(-2.0, 2.0, (21, 8))
     points[3, :4], points[4, 4:], points[5, :4] = 0.0, points[4, :4], np.inf
     expected = ca.Function("rows", [x, y], [g])(points[:, :4].T, points[:, 4:].T).full().T

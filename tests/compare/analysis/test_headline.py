@@ -11,10 +11,10 @@ import pytest
 from casadi import MX
 
 import nlp_gait
-from compare.analysis.best_known import describe_value
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import write_headline, write_headlines
 from compare.analysis.record_statistics import find_best_known
+from compare.analysis.units import describe_value
 from compare.report.study_report import write_better_points
 from compare.study.record import RunRecord
 from compare.study.references import Reference, find_reference
@@ -22,7 +22,7 @@ from compare.study.run import ProblemSpec, Run
 from compare.study.study import Study, run_study
 from nlp_gait.backends.exact import identify_problem
 from nlp_gait.formulation import Constraint
-from nlp_gait.formulation.result import load_result
+from nlp_gait.formulation.solution import load_result
 from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.proofs.certificate import load_certificates, make_certificate_file
 from nlp_gait.symbolic.nonsmooth import Nonsmooth

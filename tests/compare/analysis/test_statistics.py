@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compare.analysis.best_known import compute_gap
 from compare.analysis.record_statistics import (
     Curve,
     approximate_rank_sum,
@@ -23,6 +22,7 @@ from compare.analysis.record_statistics import (
     find_best_known,
     make_curve,
 )
+from compare.analysis.units import compute_gap
 from nlp_gait.formulation import Objective
 from tests.compare.records import record
 

@@ -6,10 +6,10 @@ import re
 
 import pytest
 
-from compare.analysis.best_known import compute_gap
 from compare.analysis.comparison import compare_problems
 from compare.analysis.headline import write_headline
 from compare.analysis.record_statistics import tie
+from compare.analysis.units import compute_gap
 from compare.study.record import RunRecord
 from nlp_gait.formulation import Objective
 from tests.compare.records import record

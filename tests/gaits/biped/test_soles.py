@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nlp_gait.gaits.biped.flight import Flight
-from nlp_gait.gaits.biped.skeleton import make_level_sole
+from nlp_gait.gaits.biped.footholds import Flight
+from nlp_gait.gaits.biped.phase_problem import make_level_sole
 from nlp_gait.robots import load_robot
 from tests.gaits.biped.lopsided import WIDTHS
 

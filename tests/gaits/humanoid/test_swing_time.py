@@ -5,8 +5,7 @@ import pytest
 
 from nlp_gait.backends.plan_walk import describe_own_bounds
 from nlp_gait.formulation import load
-from nlp_gait.gaits.biped.body import Support
-from nlp_gait.gaits.biped.bounds import make_hip_variables, make_time_variable, make_usual_bounds
+from nlp_gait.gaits.biped.body import Support, make_hip_variables, make_time_variable, make_usual_bounds
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.robots.biped import compare_swing, find_least_swing_time
 from tests.robots.crooked import crooked

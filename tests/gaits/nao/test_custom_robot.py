@@ -12,8 +12,7 @@ from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.solution import Solution
-from nlp_gait.gaits.nao.body import GRAVITY
-from nlp_gait.gaits.nao.joints import LegGeometry, measure_leg
+from nlp_gait.gaits.nao.body import GRAVITY, LegGeometry, measure_leg
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 from tests.pinocchio_oracle import check_standing, floating_model, read_state, stand

@@ -14,8 +14,7 @@ from nlp_gait.formulation import Array, Constraint, Grid
 from nlp_gait.gaits.biped.limits import Limit
 from nlp_gait.gaits.biped.motors import SUPPLY, Motors
 from nlp_gait.gaits.biped.samples import Samples
-from nlp_gait.gaits.nao.body import ANKLE_ROLL, parse_nao_motors
-from nlp_gait.gaits.nao.joints import JOINTS, YAW_PITCHES
+from nlp_gait.gaits.nao.body import ANKLE_ROLL, JOINTS, YAW_PITCHES, parse_nao_motors
 from nlp_gait.robots import load_robot
 from nlp_gait.symbolic.nonsmooth import Exact
 

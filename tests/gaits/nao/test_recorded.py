@@ -14,8 +14,7 @@ from nlp_gait.export.formats import write_as
 from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.signals import JointAngles
-from nlp_gait.gaits.nao.body import make_nao
-from nlp_gait.gaits.nao.joints import JOINTS
+from nlp_gait.gaits.nao.body import JOINTS, make_nao
 from nlp_gait.gaits.nao.recorded import RecordedGait, make_recorded_gait
 from nlp_gait.gaits.nao.recorded_motion import read_motion
 from nlp_gait.robots import load_robot
