@@ -25,7 +25,7 @@ from metaheuristics.interface import (
     Start,
     StaticPenalty,
 )
-from metaheuristics.minimize import EarlyStop, minimize
+from metaheuristics.minimize import minimize
 from metaheuristics.preparation import check_budget
 from metaheuristics.registry import (
     ADAPTERS,
@@ -45,7 +45,6 @@ __all__ = [
     "BatchObjective",
     "ConstraintHandling",
     "Deb",
-    "EarlyStop",
     "EpsilonLevel",
     "Flip",
     "GeneticAlgorithm",

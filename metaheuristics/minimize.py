@@ -6,7 +6,6 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field
 from functools import cache
-from numbers import Integral
 from threading import Lock
 from time import perf_counter
 
@@ -157,39 +156,6 @@ def _read_answer(answer: object, count: int) -> tuple[Array, Array]:
     return f, violation
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EarlyStop:
-    """What ends a search before its budget is used; None for nothing."""
-
-    target: float | None = None  #: once a feasible point has an objective <= target
-    stagnation: int | None = None  #: after so many generations without a better best
-    time_limit_s: float | None = None  #: after the first generation that ends beyond this time [s]
-
-    def __post_init__(self) -> None:
-        if self.target is not None and (not is_number(self.target) or math.isnan(self.target)):
-            raise SearchError(f"target must be a number or None, got {abbreviate(self.target)}")
-        if self.stagnation is not None and (not is_number(self.stagnation, Integral) or self.stagnation < 1):
-            raise SearchError(
-                f"stagnation must be a whole number of generations >= 1, or None for never, got {abbreviate(self.stagnation)}"
-            )
-        if self.time_limit_s is not None and not (is_number(self.time_limit_s) and self.time_limit_s > 0.0):
-            raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {abbreviate(self.time_limit_s)}")
-
-    def list_reasons(self, record: Evaluator) -> list[str]:
-        """Return the reasons to end a run now."""
-        reasons = []
-        if self.target is not None and record.best[0] == 0.0 and record.best[1] <= self.target:
-            reasons.append("target reached")
-        if self.stagnation is not None and record.stagnation >= self.stagnation:
-            reasons.append(f"no better point in {self.stagnation} generations")
-        if self.time_limit_s is not None and record.elapsed_s >= self.time_limit_s:
-            reasons.append("time limit reached")
-        return reasons
-
-
-NEVER = EarlyStop()
-
-
 @dataclass(kw_only=True)
 class _Run:
     """A search under way: its record, and why it ends."""
@@ -198,8 +164,8 @@ class _Run:
     algorithm: Algorithm
     evaluations: int
     handling: ConstraintHandling
-    stop: EarlyStop
     seed: int
+    time_limit_s: float | None = None
     point: Callable[[Array], tuple[float, float]] | None = None  # see ``Evaluate``
     reasons: list[str] = field(default_factory=list)
     initial_violation: Array | None = None
@@ -232,9 +198,10 @@ class _Run:
         return self.reasons
 
     def _list_reasons(self) -> None:
-        if self.record.evaluations >= self.evaluations or self.stop is not NEVER:
-            used = ["evaluation budget used"] if self.record.evaluations >= self.evaluations else []
-            self.reasons = used + self.stop.list_reasons(self.record)
+        if self.record.evaluations >= self.evaluations:
+            self.reasons.append("evaluation budget used")
+        if self.time_limit_s is not None and self.record.elapsed_s >= self.time_limit_s:
+            self.reasons.append("time limit reached")
 
     def _check_end(self) -> None:
         if self.reasons:
@@ -269,7 +236,7 @@ def minimize(
     evaluations: int = 10_000,
     seed: int = 0,
     handling: ConstraintHandling | None = None,
-    stop: EarlyStop | None = None,
+    time_limit_s: float | None = None,
     initial: ArrayLike | None = None,
     callback: Callback | None = None,
 ) -> interface.Result:
@@ -286,7 +253,7 @@ def minimize(
         seed: A whole number >= 0.
         handling: How constraints enter the comparisons within the search, by default by Deb's rules, by which the best
             point is reported in any case.
-        stop: What ends the search earlier, such as ``EarlyStop(target=0.85, time_limit_s=60.0)``.
+        time_limit_s: The search ends after the first generation that ends beyond this time [s].
         initial: (R, n) points within the bounds that replace the first R starting points, R <= population.
         callback: Called after each generation with X, f and violation, which it may keep but must not change; f and
             violation are infinite where the evaluation failed.
@@ -298,17 +265,17 @@ def minimize(
         SearchError: An argument is not allowed, or the objective answers with wrong shapes.
         Interrupted: Ctrl-C after at least one generation; carries the partial result.
     """
-    handling, stop = Deb() if handling is None else handling, NEVER if stop is None else stop
-    if not isinstance(stop, EarlyStop):
-        raise SearchError(f"stop must be made by EarlyStop(...), or None, got {abbreviate(stop)}")
+    handling = Deb() if handling is None else handling
+    if time_limit_s is not None and not (is_number(time_limit_s) and time_limit_s > 0.0):
+        raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {abbreviate(time_limit_s)}")
     preparation.check_budget(algorithm, evaluations)
     preparation.check_helpers(handling, callback)
-    limit_s = stop.time_limit_s
-    start = preparation.prepare_start(objective, algorithm.population, evaluations, seed, initial, limit_s)
+    start = preparation.prepare_start(objective, algorithm.population, evaluations, seed, initial, time_limit_s)
     search = algorithm.start(start)
     # A search that calls the objective evaluates point by point.
     record = Evaluator(objective, callback, thinned=isinstance(search, CallingSearch))
-    run = _Run(record=record, algorithm=algorithm, evaluations=evaluations, handling=handling, stop=stop, seed=seed)
+    run = _Run(record=record, algorithm=algorithm, evaluations=evaluations, handling=handling, seed=seed)
+    run.time_limit_s = time_limit_s
     if callback is None and isinstance(handling, Deb) and callable(getattr(objective, "point", None)):
         run.point = run.evaluate_point
     try:

@@ -25,7 +25,6 @@ from compare.study.record import (
     list_versions,
 )
 from compare.study.run import IPOPT, Inputs, Run, describe_settings
-from metaheuristics import EarlyStop
 from metaheuristics.interface import FEASIBILITY
 from metaheuristics.minimize import minimize
 from metaheuristics.registry import make_handling
@@ -218,7 +217,7 @@ def run_search(run: Run, inputs: Inputs, callback: Reporter | None = None) -> Se
             evaluations=run.evaluations,
             seed=run.run_seed,
             handling=make_handling(run.handling),
-            stop=EarlyStop(time_limit_s=run.time_limit_s),
+            time_limit_s=run.time_limit_s,
             callback=callback,
         )
     finally:

@@ -11,7 +11,7 @@ import pytest
 from metaheuristics.errors import SearchError
 from metaheuristics.external_program import ExternalProgram
 from metaheuristics.interface import Result
-from metaheuristics.minimize import EarlyStop, minimize
+from metaheuristics.minimize import minimize
 from nlp_gait.backends.kernel.compiler import find_compiler
 
 CALLERS = Path(__file__).parents[2] / "examples" / "callers"
@@ -98,7 +98,7 @@ def test_faulty_programs_fail_with_one_sentence(script: str, message: str) -> No
 def test_a_program_that_hangs_ends_at_the_time_limit_with_its_best_point() -> None:
     script = "printf '{\"x\": [0.5, 1]}\\n'; read a; read a; exec sleep 30"
     program = ExternalProgram(command=("sh", "-c", script), name="own")
-    result = minimize(Disc(), program, evaluations=100, stop=EarlyStop(time_limit_s=1.0))
+    result = minimize(Disc(), program, evaluations=100, time_limit_s=1.0)
     assert (result.evaluations, result.reasons) == (1, ("time limit reached",))
     assert result.x.tolist() == [0.5, 1.0]
 

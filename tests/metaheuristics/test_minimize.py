@@ -5,9 +5,9 @@ import pickle
 import numpy as np
 import pytest
 
-from metaheuristics import AntColony, EarlyStop, GeneticAlgorithm, Interrupted, ParticleSwarm, SearchError, minimize
+from metaheuristics import AntColony, GeneticAlgorithm, Interrupted, ParticleSwarm, SearchError, minimize
 from metaheuristics.interface import Algorithm, Array
-from tests.metaheuristics.problems import Function, disc, infeasible, sphere
+from tests.metaheuristics.problems import Function, disc, sphere
 
 SWARM = ParticleSwarm(population=10)
 
@@ -28,21 +28,6 @@ def test_starting_points_depend_on_the_seed_alone() -> None:
     assert not np.array_equal(first_generation(ParticleSwarm(), 8), swarm)
     assert np.unique(swarm).size == swarm.size
     assert (swarm.min(axis=0) < -1.5).all() and (swarm.max(axis=0) > 1.5).all()
-
-
-def test_target_needs_feasibility() -> None:
-    reached = minimize(disc(), SWARM, stop=EarlyStop(target=-1.0))
-    assert reached.reasons == ("target reached",) and reached.objective <= -1.0 and reached.feasible
-    assert reached.history.objective[-2] > -1.0 or reached.history.violation[-2] > 0.0
-    assert minimize(infeasible(), SWARM, evaluations=100, stop=EarlyStop(target=10.0)).reasons == (
-        "evaluation budget used",
-    )
-
-
-def test_stagnation_counts_generations_without_a_better_best() -> None:
-    flat = Function(lambda X: (np.zeros(len(X)), np.zeros(len(X))), [0.0], [1.0])
-    result = minimize(flat, SWARM, stop=EarlyStop(stagnation=4))
-    assert result.reasons == ("no better point in 4 generations",) and result.generations == 5
 
 
 def test_given_points_replace_the_first_rows() -> None:
@@ -108,12 +93,6 @@ def test_bad_arguments(arguments: dict[str, object], message: str) -> None:
         minimize(sphere(2), SWARM, **arguments)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("criterion", [{"target": np.nan}, {"stagnation": 0}, {"time_limit_s": 0.0}])
-def test_bad_criteria(criterion: dict[str, float]) -> None:
-    with pytest.raises(SearchError, match=f"{next(iter(criterion))} must be"):
-        EarlyStop(**criterion)  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize(
     ("answer", "message"),
     [
@@ -129,5 +108,5 @@ def test_bad_answers(answer: tuple[Array, Array], message: str) -> None:
 
 
 def test_time_limit() -> None:
-    result = minimize(disc(), SWARM, stop=EarlyStop(time_limit_s=1e-9))
+    result = minimize(disc(), SWARM, time_limit_s=1e-9)
     assert result.reasons == ("time limit reached",) and result.generations == 1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import dual_annealing
 
-from metaheuristics import Deb, EarlyStop, ParticleSwarm, SearchError, StaticPenalty, minimize, to_algorithm
+from metaheuristics import Deb, ParticleSwarm, SearchError, StaticPenalty, minimize, to_algorithm
 from metaheuristics.interface import Array
 from metaheuristics.user_algorithm import FAILED, INFEASIBLE
 
@@ -140,8 +140,6 @@ def test_the_fast_way_for_one_point_changes_nothing(handling: Any) -> None:
     np.testing.assert_array_equal(slow.x, fast.x)
     np.testing.assert_array_equal(slow.history.objective, fast.history.objective)
     assert (slow.failed_evaluations, fast.failed_evaluations) == (1, 1)
-    stop = EarlyStop(target=slow.objective)
-    assert minimize(PointDisk(), to_algorithm(walk, "walk"), evaluations=200, stop=stop).reasons == ("target reached",)
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")  # Python's own hook is silent
@@ -184,12 +182,12 @@ def test_a_function_that_hangs_ends_at_the_time_limit_with_its_best_point() -> N
         Event().wait()
 
     share_of_calls = [0.5, -0.5, 0.1]
-    algorithm, stop = to_algorithm(hanging, "hanging"), EarlyStop(time_limit_s=0.2)
-    result = minimize(Disk(), algorithm, evaluations=100, stop=stop)
+    algorithm = to_algorithm(hanging, "hanging")
+    result = minimize(Disk(), algorithm, evaluations=100, time_limit_s=0.2)
     assert (result.evaluations, result.objective, result.reasons) == (3, -1.0, ("time limit reached",))
     share_of_calls = []
     with pytest.raises(SearchError, match="f was never called: time limit reached"):
-        minimize(Disk(), algorithm, evaluations=100, stop=stop)
+        minimize(Disk(), algorithm, evaluations=100, time_limit_s=0.2)
 
 
 def test_an_error_of_the_function_is_its_own() -> None:

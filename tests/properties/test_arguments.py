@@ -58,10 +58,7 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "handling": (lambda value: minimized(handling=value), (None,)),
     "evaluations": (lambda value: minimized(evaluations=value), (10**40,)),
     "seed of minimize": (lambda value: minimized(seed=value), (10**40,)),
-    "stop": (lambda value: minimized(stop=value), (None,)),
-    "target": (lambda value: search.EarlyStop(target=value), (None, 1.5, -1, 10**40)),
-    "stagnation": (lambda value: search.EarlyStop(stagnation=value), (None, 10**40)),
-    "time_limit_s": (lambda value: search.EarlyStop(time_limit_s=value), (None, 1.5, 10**40)),
+    "time_limit_s": (lambda value: minimized(time_limit_s=value), (None, 1.5, 10**40)),
     "initial": (lambda value: minimized(initial=value), (None,)),
     "callback": (lambda value: minimized(callback=value), (None, type)),
 }
