@@ -25,8 +25,9 @@ def written(tmp_path, data):
 
 
 def test_a_few_lines_by_hand_are_enough(tmp_path):
-    result = load_result(written(tmp_path, {"problem": "nao-dsp", "x": dict(reversed(X.items()))}))
-    assert result.problem.name == "nao-dsp"
+    stated = {"problem": "nao-dsp", "options": {"robot": "nao-v6"}, "x": dict(reversed(X.items())), "status": "ignored"}
+    result = load_result(written(tmp_path, stated))
+    assert result.problem.name == "nao-dsp" and result.problem.options["robot"] == "nao-v6"
     np.testing.assert_array_equal(result.x, list(X.values()))
 
 
@@ -59,11 +60,6 @@ def test_damaged_files_are_refused_by_name(tmp_path, data, words):
     with pytest.raises(InputError, match="result.json") as caught:
         load_result(written(tmp_path, data))
     assert words in str(caught.value)
-
-
-def test_keys_that_are_not_needed_are_ignored(tmp_path):
-    stated = {"problem": "nao-dsp", "options": {"robot": "nao-v6"}, "x": X, "status": "converged"}
-    assert load_result(written(tmp_path, stated)).problem.options["robot"] == "nao-v6"
 
 
 @pytest.mark.parametrize(("period", "samples"), [(0.2, 11), (0.1, 21), (0.15, 21), (10.0, 11)])

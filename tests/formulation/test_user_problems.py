@@ -27,7 +27,6 @@ from nlp_gait.formulation.registry import check_mathematics
 from nlp_gait.formulation.solution import load_result
 from nlp_gait.user_code import read_source_files
 from tests.backends.toys import corner, toy
-from tests.robots.custom import humanoid
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "bring_your_own.py"
 THREE = MX.sym("three", 3)
@@ -41,17 +40,6 @@ def test_a_maker_in_a_file_is_loaded_with_its_options_and_solved() -> None:
     assert solve(problem, starts=2).converged
     with pytest.raises(UnknownNameError, match="did you mean 'intervals'"):
         load(f"{EXAMPLE}:two_link", interval=10)
-
-
-def test_a_robot_file_is_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    raw = humanoid()
-    Path("my.json").write_text(json.dumps(raw))
-    first = load("nao-ssp", robot="my.json").display.robot
-    raw["links"]["torso"]["mass_kg"] += 1.0
-    Path("my.json").write_text(json.dumps(raw))
-    second = load("nao-ssp", robot="my.json").display.robot
-    assert first is not None and second is not None and second.mass_kg == pytest.approx(first.mass_kg + 1.0)
 
 
 def test_an_installed_packages_problem_has_a_name(monkeypatch: pytest.MonkeyPatch) -> None:

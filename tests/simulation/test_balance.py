@@ -251,6 +251,8 @@ def test_a_push_after_the_end_is_refused(standing: Plan) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
+        ("period_s = 5.0", "period_s of a drive must be from"),
+        ("period = 1", "unknown key 'period'"),
         ("[balance]\ndcm_gain = -1.0", "dcm_gain of a balance feedback must be from 0 to 1000, got -1.0"),
         ("[controller]\nkp = 1e308\nkd = 1", "kp of a controller must be from 1e-06 to 1e+09, got 1e+308"),
         ("[balance]\n[controller]\nkp = 1\nkd = 1", "a drive has a controller or a feedback, got both"),

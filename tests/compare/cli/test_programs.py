@@ -33,10 +33,8 @@ def test_a_program_takes_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     command = f"cmd:{sys.executable} my_search.py"
     call = ["compare", "walk12", "--starts", "0", "--runs", "2", "--evaluations", "100", "--jobs", "1"]
     nlp_gait(*call, "--algorithms", f"random,{command}", "--out", "study")
-    nlp_gait(*call, "--algorithms", command, "--out", "again")
     points = read_points("study")
-    assert len(points) == 2 and points == read_points("again")
-
+    assert len(points) == 2
     nlp_gait(*call, "--algorithms", command, "--out", "study")
     assert read_points("study") == points
     nlp_gait("verify", "study", "--pack", "study.zip", "--code", command)
