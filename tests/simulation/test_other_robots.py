@@ -117,7 +117,7 @@ def test_a_root_on_the_ground_that_is_named_world_is_the_same_robot(tmp_path: Pa
     )
     traces = []
     for text in (crooked_urdf(), crooked_urdf().replace("</robot>", base)):
-        problem = nlp_gait.load("humanoid-ssp", robot=crooked(tmp_path, text))
+        problem = nlp_gait.load("humanoid-ssp", robot=crooked(tmp_path, text), intervals=2)
         plan = make_plan(result_of(problem, problem.start_point(np.random.default_rng(0))))
         run = SimulationRun(plan)
         assert run.advance(0.05) and run.fell_at_s is None

@@ -4,7 +4,7 @@ import csv
 import json
 import math
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from tests.compare.cli.calls import as_json, nlp_gait
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 TIMES = ("time_s", "cpu_s", "run_time_s", "files")
+BEAM = f"{Path(__file__).parents[3] / 'examples' / 'welded_beam.py'}:beam"
 LEGS = {"hip_height_m": 0.31, "hip_vz_start_m_s": 0.007, "hip_vz_end_m_s": 0.0}
 LEGS |= {"hip_vx_start_m_s": 0.005, "hip_vx_end_m_s": 0.068}
 
@@ -37,29 +38,31 @@ class Case:
 
     make: Callable[[], Question[Any]]
     rows: str = ""
-    line: str = ""
+    line: Sequence[str] = ()
 
 
 CASES = {
     "sweep": Case(
         make=lambda: Sweep(problem=load("walk12"), starts=1, axes=[parse_axis("step_length_m=0.08,0.1")]),
         rows="points",
-        line="sweep walk12 --over step_length_m=0.08,0.1 --starts 1",
+        line="sweep walk12 --over step_length_m=0.08,0.1 --starts 1".split(),
     ),
     "certainty": Case(
         make=lambda: Certainty(problem=load("walk12"), starts=4, time_limit_s=0.0),
-        line="certainty walk12 --starts 4 --time-limit 0",
+        line="certainty walk12 --starts 4 --time-limit 0".split(),
     ),
     "prices": Case(
-        make=lambda: Prices(problem=load("walk12"), starts=2), rows="limits", line="prices walk12 --starts 2"
+        make=lambda: Prices(problem=load(BEAM), starts=2), rows="limits", line=["prices", BEAM, "--starts", "2"]
     ),
     "pareto": Case(
         make=lambda: Pareto(
             problem=load("nao-dsp", intervals=2).fix(**LEGS), points=5, starts=1, searches={"NSGA2": (100,)}, runs=1
         ),
         rows="front",
-        line="pareto nao-dsp --set intervals=2 --points 5 --starts 1 --search NSGA2=100 --runs 1 "
-        + " ".join(f"--set {name}={value}" for name, value in LEGS.items()),
+        line=[
+            *"pareto nao-dsp --set intervals=2 --points 5 --starts 1 --search NSGA2=100 --runs 1".split(),
+            *(f"--set={name}={value}" for name, value in LEGS.items()),
+        ],
     ),
 }
 each_question = pytest.mark.parametrize("name", CASES)
@@ -126,12 +129,12 @@ def test_an_interrupted_question_continues_to_the_same_answer(
 
 @pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.line])
 def test_its_command_prints_the_answer(name: str, folder: Path) -> None:
-    printed = as_json(*CASES[name].line.split(), "--out", folder / name)
+    printed = as_json(*CASES[name].line, "--out", folder / name)
     assert all(Path(file).stat().st_size > 0 for file in printed["files"])
     assert without_times(printed) == without_times(
         json.loads(json.dumps(replace_nan(answer(name, Memo(folder / name)).data)))
     )
-    assert "wrote " in nlp_gait(*CASES[name].line.split(), "--out", folder / name).stdout
+    assert "wrote " in nlp_gait(*CASES[name].line, "--out", folder / name).stdout
 
 
 @each_question
@@ -141,7 +144,7 @@ def test_files_agree_with_the_answer(name: str, folder: Path, tmp_path: Path) ->
     assert {path.name for path in written} == {path.name for path in tmp_path.iterdir()}
     data = json.loads((tmp_path / f"{result.stem}.json").read_text())
     assert data == json.loads(json.dumps(replace_nan(result.data)))
-    assert "best_known" in data and data["problem"] == CASES[name].make().problem.address
+    assert "best_known" in data and data["problem"] == CASES[name].make().problem.name
     page = (tmp_path / f"{result.stem}.md").read_text().replace("\\", "")  # Markdown's escapes
     assert f"# {result.title}" in page and all(sentence[:20] in page for sentence in result.headline)
     for table in (part for part in result.parts if isinstance(part, Table) and part.name):

@@ -1,26 +1,16 @@
 """Prices of limits and of errors in the robot's data, as command and as function."""
 
-from pathlib import Path
-
 import pytest
 
 from compare.questions.prices import AGREEMENT, Prices
-from compare.questions.question import Work, find
-from compare.study.memo import Memo
+from compare.questions.question import find
 from nlp_gait import load, make_solver
 from nlp_gait.errors import InputError
-
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the stored solves of the question that the tests have in common."""
-    return tmp_path_factory.mktemp("prices")
+from tests.backends.toys import corner, toy
 
 
-def test_slopes_agree_with_solving_again_where_it_can_be_done(folder: Path) -> None:
-    found = find(Prices(problem=load("walk12"), starts=2), Work(memo=Memo(folder)))
+def test_slopes_agree_with_solving_again_where_it_can_be_done() -> None:
+    found = find(Prices(problem=load("walk12"), starts=2))
     assert found.robot == found.weak == () and found.reason is None
     # f holds (1 - lambda) s / f2max, so that its slope is -(1 - 0.15) 0.13 / 0.13^2.
     assert found.limits[0].name == "f2max_m" and found.limits[0].slope == pytest.approx(-0.85 / 0.13, rel=1e-6)
@@ -39,8 +29,8 @@ def test_a_solver_without_multipliers_has_no_prices() -> None:
 
 
 def test_a_fixed_variable_has_one_price() -> None:
-    found = find(Prices(problem=load("walk12").fix(step_length_m=0.1), starts=1))
-    price = next(price for price in found.limits if price.name == "step_length_m")
-    assert price.x is not None and price.x["step_length_m"] == pytest.approx(1.0)
-    assert price.error is not None and price.error < AGREEMENT
-    assert not any(other.name.startswith("step_length_m.") for other in found.limits)
+    """|x - 1| + 2 |y - 1| with y above 1.5."""
+    found = find(Prices(problem=toy(corner, limit=1.5).fix(x=1.7), starts=1))
+    assert {price.name: price.slope for price in found.limits} == pytest.approx({"limit": 2.0, "x": 1.0})
+    assert [price.x and price.x["x"] for price in found.limits] == pytest.approx([0.0, 1.0])
+    assert all(price.error is not None and price.error < AGREEMENT for price in found.limits)
