@@ -15,7 +15,7 @@ import pytest
 import nlp_gait
 from nlp_gait.backends.solve import count_workers
 from nlp_gait.backends.solvers.solver import Solver, judge_point
-from nlp_gait.errors import InputError, WorkerError
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.interrupts import Interrupted, never
@@ -115,20 +115,6 @@ def test_an_interrupt_ends_all_processes_and_keeps_what_they_have() -> None:
     assert isinstance(kept, nlp_gait.Solution)
     assert np.array_equal(kept.starts[0].x0, first)
     assert 2 <= len(kept.starts) <= 3 and all(start.status == "was interrupted" for start in kept.starts[1:])
-    assert not multiprocessing.active_children()
-
-
-def test_what_a_run_raises_is_raised_and_a_dead_process_is_reported() -> None:
-    problem = toy(corner)
-    first = problem.start_point(np.random.default_rng(0))
-
-    def refuse() -> None:
-        raise InputError("not this one")
-
-    with pytest.raises(InputError, match="not this one"):
-        nlp_gait.solve(problem, starts=3, solver=Scripted(first=first, at_first=refuse), workers=2)
-    with pytest.raises(WorkerError, match="by status 7"):
-        nlp_gait.solve(problem, starts=3, solver=Scripted(first=first, at_first=lambda: os._exit(7)), workers=2)
     assert not multiprocessing.active_children()
 
 

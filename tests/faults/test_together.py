@@ -1,14 +1,11 @@
 """One process or several, one thread or several: the same numbers."""
 
-import io
 import multiprocessing
 import os
 import subprocess
 import sys
 import threading
-import warnings
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -123,41 +120,3 @@ def test_what_was_used_goes_to_other_processes(program: str, method: str, tmp_pa
         timeout=200,
     )
     assert done.stdout == "equal\n", done.stderr
-
-
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-# Numbers are printed to the last bit.
-SOLVERS = """
-import metaheuristics, nlp_gait
-from compare.study.run import GRADIENT_SOLVERS, list_solvers
-from nlp_gait.backends.solvers.registry import make_solver
-problem = nlp_gait.load("nao-ssp", intervals=4)
-objective = nlp_gait.compile_objective(problem)
-for name in list_solvers():
-    if name in GRADIENT_SOLVERS:
-        continue
-    found = metaheuristics.minimize(objective, metaheuristics.make_algorithm(name), evaluations=170, seed=1)
-    print(name, found.evaluations, found.objective.hex(), [value.hex() for value in found.x.tolist()])
-for name, settings in (("ipopt", {}), ("slsqp", {"evaluations": 100})):
-    outcome = make_solver(name, **settings).prepare(problem, 1).run(problem, 0.5 * (problem.lower + problem.upper))
-    print(name, outcome.evaluations.f, outcome.objective.hex(), [value.hex() for value in outcome.x.tolist()])
-"""
-
-
-def test_every_solver_repeats_its_result_in_other_processes() -> None:
-    """One process has one thread and a fixed hash seed, this one all threads and any hash seed."""
-    one = subprocess.run(
-        [sys.executable, "-c", SOLVERS],
-        cwd=ROOT,
-        env={**os.environ, **dict.fromkeys(THREADS, "1"), "PYTHONPATH": str(ROOT), "PYTHONHASHSEED": "1"},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=True,
-    )
-    printed = io.StringIO()
-    with redirect_stdout(printed), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # as in a process of its own
-        exec(SOLVERS, {})  # noqa: S102
-    assert one.stdout.splitlines() == printed.getvalue().splitlines()
-    assert one.stdout.count("\n") >= 21

@@ -129,16 +129,6 @@ def test_parameters_change_without_a_new_library(monkeypatch: pytest.MonkeyPatch
     assert strict_f[0] == pytest.approx(value, rel=COST_TOLERANCE)
 
 
-@pytest.mark.parametrize("lanes", LANES)
-def test_a_problem_solved_by_hand(lanes: int) -> None:
-    objective = compile_objective(toy(corner), require_compiler=True, lanes=lanes)
-    f, violation = objective(np.array([[1.0, 1.0], [2.0, 0.25], [-2.5, 1.0]]))
-    assert f == pytest.approx([0.0, 2.5, 3.5])
-    # In units of the scales: 0.1 m for the row, the width of the range (4 m) for x.
-    assert violation == pytest.approx([0.0, 2.5, 30.0 + 0.125])
-    assert objective.row_names == ("row", "bounds[x]", "bounds[y]")
-
-
 def test_interpreted_gives_the_same(request: pytest.FixtureRequest, caplog: pytest.LogCaptureFixture) -> None:
     problem = problem_named("nao-ssp")
     X = candidates(problem, 70)

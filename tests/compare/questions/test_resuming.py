@@ -1,32 +1,12 @@
-"""Steps of questions in their memo: by several processes, damaged, and of a changed robot."""
+"""Steps of questions in their memo: by several processes, and damaged."""
 
 import os
 from functools import partial
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
-import nlp_gait
-from compare.questions.certainty import Certainty
-from compare.questions.question import Work, find
 from compare.study.memo import Memo
-
-
-def test_results_of_another_robot_are_others(tmp_path: Path) -> None:
-    robot = tmp_path / "my.json"
-    text = (files("nlp_gait.robots") / "data" / "nao-v5.json").read_text(encoding="utf-8")
-    heavy = text.replace('"mass_kg": 1.04956', '"mass_kg": 1.5')
-    assert heavy != text
-    powers, stored = [], []
-    for content in (text, heavy, text):
-        robot.write_text(content, encoding="utf-8")
-        problem = nlp_gait.load("nao-ssp", robot=str(robot), intervals=2).fix(swing_height_m=0.02)
-        certainty = Certainty(problem=problem, starts=1, time_limit_s=0.0)
-        powers.append(find(certainty, Work(memo=Memo(tmp_path))).optima[0].objective)
-        stored.append(len(list((tmp_path / "store").iterdir())))
-    assert powers[1] > powers[0] == powers[2]
-    assert stored == [1, 2, 2]
 
 
 def record_call(folder: Path, number: int) -> dict[str, float]:

@@ -1,31 +1,23 @@
 """Richer motions of the NAO phases: what they contain, what they keep, what limits them, and what they save."""
 
-import json
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 
 from nlp_gait.formulation import Array, GaitProblem, load
 from tests.backends.toys import row_violations
 from tests.evaluation import evaluated
+from tests.gaits.nao.test_readings import PRINTED
 
-GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))
 NAMES = ("nao-ssp", "nao-dsp")
 OWN = {"nao-ssp": 9, "nao-dsp": 8}
 # The same sums in another order.
 ROUNDING = 1e-12
 
 
-def golden(name: str) -> dict[str, Any]:
-    return next(row for row in GOLDEN["rows"] if row["problem"] == name)
-
-
 def padded(problem: GaitProblem, coefficients: float | Array = 0.0) -> Array:
     x = np.zeros(len(problem.names))
     own = OWN[problem.name]
-    x[:own], x[own:] = golden(problem.name)["x"], coefficients
+    x[:own], x[own:] = PRINTED[problem.name, "PSO"][0], coefficients
     return x
 
 
@@ -39,7 +31,7 @@ def some(problem: GaitProblem, seed: int = 0) -> Array:
 @pytest.mark.parametrize("order", ["quintic", "spline-4"])
 def test_without_coefficients_the_motion_is_the_papers(name: str, order: str) -> None:
     problem = load(name, trajectory=order, samples_per_interval=1)
-    rich, plain = evaluated(problem, padded(problem)), evaluated(load(name), golden(name)["x"])
+    rich, plain = evaluated(problem, padded(problem)), evaluated(load(name), PRINTED[name, "PSO"][0])
     assert rich.indexes == pytest.approx(plain.indexes, rel=ROUNDING)
 
 

@@ -73,3 +73,12 @@ def test_differences_are_those_of_numpy(derivatives: str, edge_order: int) -> No
     np.testing.assert_allclose(
         arrays["qdd"], np.gradient(rates, arrays["t"], axis=0, edge_order=edge_order), atol=1e-12
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "power_W"),
+    [("nao-ssp", {}, 0.845868), ("nao-dsp", {}, 0.531886), ("nao-dsp", {"torso_share": "lever"}, 0.464777)],
+)
+def test_ipopt_finds_the_optimum_from_a_random_start(name: str, share: dict[str, Any], power_W: float) -> None:
+    solution = nlp_gait.solve(nlp_gait.load(name, **share), starts=1, seed=1)
+    assert solution.converged and solution.objective == pytest.approx(power_W, rel=1e-5)
