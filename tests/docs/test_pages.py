@@ -1,12 +1,15 @@
-"""Generated pages: none is missing, each says what its object is, and the check of a site finds what is wrong."""
+"""Generated pages: none is missing, each says what its object is; the check of a site finds what is wrong; what to cite."""
 
 import importlib
 import re
+import tomllib
 from pathlib import Path
 from pkgutil import resolve_name
 
 import pytest
+import yaml
 
+import nlp_gait
 from compare.cli import PANELS, load_command
 from compare.study.run import list_solvers
 from docs.check import faults_of
@@ -145,3 +148,17 @@ def test_commands_of_pages_exist_with_their_options(path: Path) -> None:
             "--json",
         }
         assert {word.rstrip(".,)") for word in words if word.startswith("--")} <= options, line
+
+
+CFF = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+
+
+def test_the_citation_file_is_valid_and_of_this_version() -> None:
+    """By the schema of CFF 1.2.0."""
+    assert CFF.keys() >= {"authors", "cff-version", "message", "title"} and CFF["cff-version"] == "1.2.0"
+    assert re.fullmatch(r"\d{4}-\d{2}-\d{2}", CFF["date-released"])
+    for reference in CFF["references"]:
+        assert reference.keys() >= {"authors", "title", "type"} and reference["type"] in ("article", "report")
+        assert all(author.keys() <= {"family-names", "given-names"} for author in reference["authors"])
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert CFF["version"] == nlp_gait.__version__ and CFF["license"] == project["project"]["license"]

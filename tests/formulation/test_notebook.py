@@ -1,4 +1,4 @@
-"""Display of results: one line in a terminal, a small table in a notebook, data frames, and the balance margin."""
+"""Display of results in a terminal, a notebook and data frames; time histories describe all their columns."""
 
 from pathlib import Path
 
@@ -9,9 +9,10 @@ import nlp_gait
 from compare.study.record import COLUMNS, RunRecord, make_frame
 from compare.study.run import ProblemSpec, Run
 from compare.study.study import Study
-from nlp_gait.errors import UnknownNameError
-from nlp_gait.formulation import Columns, Signals
+from nlp_gait.errors import InputError, UnknownNameError
+from nlp_gait.formulation import Columns, Signals, make_vector_columns
 from nlp_gait.formulation.display import Skeleton, Sole, make_rectangle
+from tests.backends.toys import corner, toy
 from tests.compare.records import record
 
 T = np.array([0.0, 0.5, 1.0])
@@ -85,3 +86,34 @@ def test_balance_margin_of_a_planar_model_is_along_its_soles() -> None:
     np.testing.assert_allclose(
         walker([(0.0, 0.0), (0.09, 0.0), (0.15, 0.0)], half_width=0.0).margin(), [0.1, 0.01, -0.05]
     )
+
+
+def test_every_column_has_its_name_and_unit() -> None:
+    """Joints' units are known; a single column needs no label; time stands first, wherever it is given."""
+    signals = Signals(
+        joints=("hip", "knee"),
+        arrays={"tau": np.ones((3, 2)), "zmp": np.zeros((3, 2)), "share": T, "t": T},
+        columns={"zmp": make_vector_columns("m", "xy"), "share": Columns(unit="1")},
+    )
+    units = {"t": "s", "tau hip": "Nm", "tau knee": "Nm", "zmp x": "m", "zmp y": "m", "share": "1"}
+    assert [(name, unit) for name, unit, _ in signals.named_columns()] == list(units.items())
+    np.testing.assert_array_equal(list(signals.named_columns())[-1][2], T)
+
+
+@pytest.mark.parametrize(
+    ("name", "columns", "message"),
+    [
+        ("mood", {}, "time history 'mood' has no unit"),
+        ("zmp", {"zmp": make_vector_columns("m")}, "'zmp' has 2 columns, but 3 are described"),
+        ("zmp", {"zmp": Columns(unit="m")}, "'zmp' has 2 columns, but 1 are described"),
+        ("q", {}, "'q' has 2 columns, but 1 are described"),
+    ],
+)
+def test_what_is_not_described_as_it_is_is_refused(name: str, columns: dict[str, Columns], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Signals(joints=("hip",), arrays={"t": T, name: np.zeros((3, 2))}, columns=columns)
+
+
+def test_a_problem_without_time_histories_says_so() -> None:
+    with pytest.raises(InputError, match="problem 'toy' has no time histories"):
+        toy(corner).signals([0.0, 0.0])

@@ -1,10 +1,17 @@
-"""Documents: what stands where on the page, in Markdown and in the files beside it."""
+"""Documents: what stands where on the page, in Markdown and in files; gaits are drawn, or why not is said."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
+from compare.analysis.comparison import Comparison, compare_problems
 from compare.drawing.figures import make_figure
+from compare.drawing.gait_figure import draw_gaits, make_gait_charts
 from compare.report.document import Document, Figure, Prose, Section, Table
+from compare.report.study_sections import load_gaits
 from compare.report.writing import write_document
+from tests.compare.records import DSP_X, record
 
 POWERS = Table(
     columns={"solver": "", "power [W]": ".2f", "feasible": ""},
@@ -39,3 +46,33 @@ def test_markup_in_the_programs_own_text_is_no_html(tmp_path: Path) -> None:
     write_document(tmp_path, Document(title="<b>", parts=[Prose("**strong** <script>x</script>")]))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<strong>strong</strong> &lt;script&gt;x" in page and "<b>" not in page
+
+
+def comparison(name: str, x: dict[str, float], *solvers: str) -> Comparison:
+    records = [record(solver, 0, [(1, 0.5)], problem="dsp") for solver in solvers]
+    stored = {"name": name, "options": {}, "parameters": {}}
+    changed = [replace(r, x=x, inputs=replace(r.inputs, problem=stored)) for r in records]
+    return compare_problems(changed)[0]
+
+
+def test_the_best_gait_is_drawn_with_curves_of_all() -> None:
+    gaits = load_gaits(comparison("nao-dsp", DSP_X, "pso", "ga"))
+    assert not isinstance(gaits, str)
+    charts = make_gait_charts(gaits)
+    assert [len(chart.series) for chart in charts] == [2, 2]
+    assert [chart.y for chart in charts] == ["mechanical power [W]", "balance margin [mm]"]
+    (poses,) = draw_gaits(gaits, curves=False)
+    assert all(f">{words}</text>" in poses.to_svg() for words in ("left leg", "right leg"))
+
+
+@pytest.mark.parametrize(
+    ("name", "x", "why"),
+    [
+        ("nao-dsp", {"a": 1.0}, "must name every variable once"),
+        ("never.py:seen", {"a": 1.0}, "never.py"),
+    ],
+)
+def test_what_cannot_be_drawn_is_reported(name: str, x: dict[str, float], why: str) -> None:
+    """Code that a record names is not run for it."""
+    part = load_gaits(comparison(name, x, "pso"))
+    assert isinstance(part, str) and part.startswith("The gaits are not drawn: ") and why in part

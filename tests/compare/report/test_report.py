@@ -12,6 +12,7 @@ from compare.analysis.columns import summarise
 from compare.analysis.comparison import compare_problems
 from compare.analysis.headline import write_headline
 from compare.report import FurtherFiles, write_report
+from compare.report.provenance import make_solver_table
 from compare.report.study_report import make_study_document, renew_report
 from compare.study.study import StudyFile, name_record, write_record
 from nlp_gait.errors import InputError
@@ -204,3 +205,15 @@ def test_a_running_study_says_how_many_runs_have_ended(tmp_path: Path) -> None:
     assert "3 of 4 runs have ended" in (tmp_path / "report.html").read_text()
     write_report(tmp_path, records, replace(FILE, runs=tuple(planned)))
     assert "runs have ended" not in (tmp_path / "report.html").read_text()
+
+
+def test_runs_with_equal_settings_are_one_row() -> None:
+    runs = [record("pso", k, [(10, 1.0)]) for k in range(3)]
+    changed = replace(runs[2], inputs=replace(runs[2].inputs, settings={"population": 30}))
+    table = make_solver_table([*(replace(run, settings={"population": 50}) for run in runs[:2]), changed])
+    rows = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
+    assert [(row["given settings"], row["all settings"]) for row in rows] == [
+        ("-", "population: 50"),
+        ("population: 30", "kind: pso"),
+    ]
+    assert [(row["seeds"], row["runs"]) for row in rows] == [("0 to 1", "2"), ("2 to 2", "1")]

@@ -1,5 +1,6 @@
-"""Rows of limits by hand, on samples small enough to check on paper."""
+"""Rows of limits and places of soles by hand, on samples small enough to check on paper."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import casadi as ca
@@ -9,12 +10,15 @@ from casadi import DM, MX
 
 from nlp_gait.formulation import Grid
 from nlp_gait.gaits.biped.body import Body
+from nlp_gait.gaits.biped.footholds import Flight
 from nlp_gait.gaits.biped.goals import INSTEAD
 from nlp_gait.gaits.biped.limits import TorqueChange, compute_margins
+from nlp_gait.gaits.biped.phase_problem import make_level_sole
 from nlp_gait.gaits.biped.support_phases import make_support_box
 from nlp_gait.gaits.nao.body import make_nao
+from nlp_gait.robots import load_robot
 from nlp_gait.symbolic.nonsmooth import Exact
-from tests.gaits.biped.lopsided import make_lopsided
+from tests.gaits.biped.lopsided import WIDTHS, make_lopsided
 
 TORQUE = np.array([[0.0, 1.0, 3.0, 6.0, 10.0], [5.0, 4.0, 2.0, 2.0, 1.0]])
 
@@ -63,3 +67,23 @@ def test_the_box_around_both_soles_ends_at_their_outer_edges() -> None:
     assert numbers(compute_margins(box, MX(DM([[0.0], [0.0]])), Exact())[1]) == pytest.approx(
         [min(0.05 + left.left_m, 0.05 + right.right_m)]
     )
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_drawn_sole_reaches_as_far_to_each_side_as_the_foot(side: str) -> None:
+    robot = load_robot("nao-v5")
+    foot = replace(robot.feet[side], **WIDTHS[side])
+    sole = make_level_sole(replace(robot, feet={**robot.feet, side: foot}), side, np.zeros((1, 3)))
+    ends = [foot.front_m, foot.back_m, foot.left_m, foot.right_m]
+    x, y = sole.corners[0, :, 0], sole.corners[0, :, 1]
+    assert [x.max(), -x.min(), y.max(), -y.min()] == pytest.approx(ends)
+
+
+def test_a_sole_stands_in_the_middle_of_its_tread() -> None:
+    foot = load_robot("nao-v5").feet["left"]
+    run = foot.back_m + foot.front_m + 0.04
+    for k, tread in enumerate(Flight(rise_m=0.02, run_m=run, foot=foot).list_treads(3), start=1):
+        ankle = k * run  # each step advances by one tread
+        assert ankle - foot.back_m - tread.edge_m == pytest.approx(0.02)
+        assert tread.edge_m + run - (ankle + foot.front_m) == pytest.approx(0.02)
+        assert tread.height_m == pytest.approx(0.02 * k)

@@ -1,17 +1,20 @@
-"""The planner: feasible on a dense grid, never beaten by a search, and clear about what forbids a stair."""
+"""The planner: feasible on a dense grid, never beaten by a search, and clear about what forbids a stair; its hip's motion."""
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 import scipy.integrate
+from casadi import SX
 
 import nlp_gait
 from compare.judge import evaluate
 from compare.papers.stairs.printed import TABLE_3, TABLE_4
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.stairs.planar_biped import load_toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, load_toe_foot_biped
+from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, locate_hip, move_in_time
 from nlp_gait.gaits.stairs.stair import PAPER_TIMES
 
 # Best of 20 starts, case 2 of Table IV.
@@ -86,3 +89,26 @@ def test_energy_is_the_integral_of_power() -> None:
     t, power = (np.split(values, 4) for values in (arrays["t"], np.abs(arrays["power"]).sum(axis=1)))
     energy = sum(scipy.integrate.trapezoid(p, x=instants) for p, instants in zip(power, t, strict=True))
     assert evaluate(problem, x).indexes["energy_J"] == pytest.approx(energy, rel=1e-12)
+
+
+PLAN = dict.fromkeys(StairPlan._fields, 0.1)
+PLAN |= {"hip_height": 0.69, "hip_start": 0.09, "zmp_start": 0.24, "zmp_end": 0.09}
+TIMES = {"t1": 0.5, "t2": 1.4, "t_bc": 2.2, "t3": 3.5}
+TREAD_M, RISE_M = 0.254, 0.1778
+
+
+@pytest.mark.parametrize("speed", [1.0, 10.0])
+@pytest.mark.parametrize("phase", range(4))
+def test_the_hip_is_a_pendulum_over_the_planned_zmp(phase: int, speed: float) -> None:
+    """Its acceleration is w^2 (x - zmp), also in a step so fast that neither of its exponentials has faded."""
+    times = {name: value / speed for name, value in TIMES.items()}
+    fast = StairPlan(**{name: SX(value) for name, value in {**PLAN, **times}.items()})
+    s, passing = SX.sym("s", 4), SX.sym("passing", 4)
+    motion = move_in_time(locate_hip(fast, Stair(SX(TREAD_M), SX(RISE_M)), s), s, passing / fast.durations)
+    at = ca.Function("hip", [s, passing], [motion.position[0], motion.acceleration[0], ca.dot(fast.durations, s)])
+    x, acceleration, t = (float(part) for part in at([1.0] * phase + [0.3] + [0.0] * (3 - phase), np.eye(4)[phase]))
+    way, passed = TREAD_M + PLAN["zmp_end"] - PLAN["zmp_start"], t / times["t3"]
+    zmp = PLAN["zmp_start"] + way * passed**2 * (3 - 2 * passed)
+    assert acceleration == pytest.approx(GRAVITY / PLAN["hip_height"] * (x - zmp), rel=1e-9, abs=1e-9)
+    ends = [float(at([end] * 4, [0] * 4)[0]) for end in (0, 1)]
+    assert ends == pytest.approx([PLAN["hip_start"], PLAN["hip_start"] + TREAD_M], abs=1e-12)
