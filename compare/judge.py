@@ -111,7 +111,7 @@ def find_faults(result: Result, path: Path) -> list[str]:
     if not math.isfinite(value):
         reason = f"result {str(path)!r}: {problem.objective.name} is {value} at this x"
         raise InputError("; ".join(filter(None, (reason, violated))))
-    if isinstance(stated, int | float) and not abs(stated - value) <= SLIGHT * abs(value):
+    if stated is not None and not abs(stated - value) <= SLIGHT * abs(value):
         unit = problem.objective.unit
         sentences.append(f"The file says {problem.objective.name} {stated:.6g} {unit}, and it is {value:.6g} {unit}")
     return sentences

@@ -25,7 +25,7 @@ from typing import Annotated, Any, NoReturn, get_args
 import typer
 from typer.models import ParameterInfo
 
-from compare.cli.printing import Output, fail, print_output, say_error
+from compare.cli.printing import Output, fail, print_output, report_silence, say_error
 from nlp_gait.decoding import find_groups, list_options, pack_options, replace_signature
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import check_output
@@ -60,7 +60,7 @@ def command(function: Callable[..., Output]) -> Callable[..., None]:
     def run(**given: Any) -> None:
         as_json, context = given.pop("as_json"), given.pop("context")
         try:
-            with raise_interrupts():
+            with raise_interrupts(), report_silence(f"nlp-gait {context.info_name}"):
                 _check_values(context, given)
                 force = given.pop("force", False) if outputs else False
                 for name in outputs:

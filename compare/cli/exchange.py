@@ -94,7 +94,7 @@ def verify(
     rows = [(row.what, row.kind, row.why) for row in result.rows]
     return Output(
         data={"holds": result.holds, "sentence": result.sentence, "rows": [row._asdict() for row in result.rows]},
-        parts=[Rows("differences", ("what", "", "why"), rows)] if rows else [],
+        parts=[Rows("differences", ("what", "result", "why"), rows)] if rows else [],
         written=written,
         answer=[result.sentence],
         failures=[] if result.holds else ["the study is not verified, see the table"],

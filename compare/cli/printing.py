@@ -1,12 +1,14 @@
 """What commands print: results, written files, progress, and the sentences with which they end."""
 
 import json
+import os
 import shlex
 import sys
+import threading
 import time
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -22,7 +24,7 @@ from nlp_gait.files import replace_nan
 MOST_NAMED = 3  # written files; of more, the first one is named
 LONGEST_CELL = 24  # characters of a word in a table that are not wrapped
 LONGEST_SENTENCE = 2000  # characters of an error message, in which a value can be a whole file
-LOG_PERIOD_S = 30.0  # between lines of progress in a log
+LOG_PERIOD_S = 5.0  # between lines of progress in a log
 REFRESHED_PER_S = 5.0  # line of progress on a terminal
 COLUMNS = 79  # of a line of progress, at most
 
@@ -139,14 +141,13 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
 
 
 class ProgressLine:
-    """A line on a terminal that is rewritten; in a log, a line every half minute."""
+    """A line on a terminal that is rewritten; in a log, a line every few seconds."""
 
-    def __init__(self, description: str, total: int | None, note: str) -> None:
+    def __init__(self, description: str, total: int | None = None, note: str = "") -> None:
         """Begin; ``total`` is None for work of unknown length."""
         self.description, self.total, self.note = description, total, note
         self.done = self.fresh = 0
         self.started = time.monotonic()
-        self.next_s = LOG_PERIOD_S
 
     def __call__(self, note: str, steps: int = 1) -> None:
         """Count a step and show its note; more steps than one were done by an earlier command."""
@@ -154,17 +155,16 @@ class ProgressLine:
             return
         self.done, self.note = self.done + steps, "; ".join(note.splitlines())
         self.fresh += steps == 1
-        if not stderr.is_terminal and time.monotonic() - self.started >= self.next_s:
-            self.next_s += LOG_PERIOD_S
-            say(self.describe())
 
     def describe(self) -> str:
         """Return for example ``runs 48 of 106, 31 s left, best gap 0.0046 % (nao-ssp, ACO)``."""
-        seconds, of = time.monotonic() - self.started, "" if self.total is None else f" of {self.total:,}"
+        seconds, counted = time.monotonic() - self.started, ""
+        if self.total is not None or self.done:
+            counted = f" {self.done:,}" + ("" if self.total is None else f" of {self.total:,}")
         left = format_duration(seconds)
         if self.total is not None and self.fresh:
             left = f"{format_duration(seconds / self.fresh * max(self.total - self.done, 0))} left"
-        return escape_controls(", ".join(filter(None, (f"{self.description} {self.done:,}{of}", left, self.note))))
+        return escape_controls(", ".join(filter(None, (f"{self.description}{counted}", left, self.note))))
 
     def render(self) -> Text:
         """Return the line as the terminal shows it."""
@@ -178,24 +178,50 @@ def format_duration(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
 
 
+_lines: list[ProgressLine] = []  # of this command, the one that is shown last
+
+
 @contextmanager
-def show_progress(description: str, total: int | None, first: str = "") -> Iterator[Callable[..., None]]:
+def report_silence(command: str) -> Iterator[None]:
+    """Say every few seconds what the command works on, where no line on a terminal shows it."""
+    ended, own = threading.Event(), ProgressLine(f"{command} is at work")
+
+    def speak() -> None:
+        while not ended.wait(LOG_PERIOD_S):
+            line = (_lines or [own])[-1]
+            if line is own or not stderr.is_terminal:
+                os.write(2, f"{line.describe()}\n".encode())  # a fork must not wait for a lock of the console
+
+    threading.Thread(target=speak, daemon=True).start()
+    try:
+        yield
+    finally:
+        ended.set()
+
+
+@contextmanager
+def show_progress(description: str, total: int | None = None, first: str = "") -> Iterator[ProgressLine]:
     """Show progress on stderr, of unknown length if total is None; ``first`` is the note before the first step.
 
     The yielded function takes a note, and steps other than 1 for what an earlier command did.
     """
     line = ProgressLine(description, total, first)
-    if not stderr.is_terminal:
-        yield line
-        return
+    _lines.append(line)
+    try:
+        with _show_live(line) if stderr.is_terminal else nullcontext():
+            yield line
+    finally:
+        _lines.remove(line)
+
+
+def _show_live(line: ProgressLine) -> AbstractContextManager[object]:
     from rich.live import Live
 
-    with Live(
+    return Live(
         get_renderable=line.render,
         console=stderr,
         transient=True,
         refresh_per_second=REFRESHED_PER_S,
         redirect_stdout=False,  # a fork must not wait for a lock of this display
         redirect_stderr=False,
-    ):
-        yield line
+    )

@@ -7,7 +7,8 @@ The judge evaluates the point in a process that user code cannot reach.
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -31,8 +32,8 @@ from metaheuristics.registry import make_handling
 from nlp_gait.backends.exact import identify_problem
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.backends.solve import make_solution
-from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array
+from nlp_gait.errors import GaitError, InputError
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Best
 from nlp_gait.processes import Job
 
@@ -200,12 +201,32 @@ def _search_reported(run: Run, inputs: Inputs, send: Send) -> SearchEnd | str:
         return describe_error(error)
 
 
+@contextmanager
+def report_changes() -> Iterator[None]:
+    """Raise ChangedFileError for what was there and right when the study began."""
+    try:
+        yield
+    except GaitError as error:
+        raise ChangedFileError(f"a file has changed since the study began: {error}") from error
+
+
+def load_unchanged(run: Run, inputs: Inputs) -> GaitProblem:
+    """Return the problem of a run; raises ChangedFileError if it is not that of the inputs."""
+    with report_changes():
+        problem = run.problem.load()
+        if identify_problem(problem) != inputs.problem:
+            raise InputError("the problem is another one now")
+        return problem
+
+
 def run_search(run: Run, inputs: Inputs, callback: Reporter | None = None) -> SearchEnd:
     """Run a search; raises ChangedFileError if a file is not the one whose hash is in the inputs."""
     started = time.perf_counter()
-    files, problem = run.read_code(), run.problem.load()
-    if (files is not None and files.digest != inputs.code) or identify_problem(problem) != inputs.problem:
-        raise ChangedFileError("a file of the problem or of a solver has changed since the study began")
+    problem = load_unchanged(run, inputs)
+    with report_changes():
+        files = run.read_code()
+        if files is not None and files.digest != inputs.code:
+            raise InputError("a file of a solver is another one now")
     built = time.perf_counter()
     objective = compile_objective(problem)
     compiled = time.perf_counter()
@@ -260,7 +281,7 @@ def judge_search(run: Run, inputs: Inputs, end: SearchEnd) -> RunRecord:
 
 def judge_run(run: Run, inputs: Inputs, course: Sequence[Best], x: Array, time_s: Times, **results: Any) -> RunRecord:
     """Return the record of a run that ends at x (n,): of its course the first entry, each change, and the last one."""
-    problem, last = run.problem.load(), len(course) - 1
+    problem, last = load_unchanged(run, inputs), len(course) - 1
     kept = [b for k, b in enumerate(course) if k in (0, last) or b.objective != course[k - 1].objective]
     return make_record(
         run,
@@ -276,7 +297,7 @@ def judge_run(run: Run, inputs: Inputs, course: Sequence[Best], x: Array, time_s
 def run_solver(run: Run, inputs: Inputs) -> RunRecord:
     """Run an NLP solver, from the given start or from a random point."""
     started = time.perf_counter()
-    problem, solver = run.problem.load(), run.make_solver()
+    problem, solver = load_unchanged(run, inputs), run.make_solver()
     x0 = problem.check_within(run.start) if run.start else problem.start_point(np.random.default_rng(run.run_seed))
     outcome = solver.prepare(problem, PLANNED_RUNS).run(problem, x0)
     prepared_s = time.perf_counter() - started - outcome.time_s

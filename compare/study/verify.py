@@ -57,12 +57,10 @@ class Verification(NamedTuple):
     @property
     def sentence(self) -> str:
         """The result in words, with the chance that altered runs were not among the repeated ones."""
-        wrong = sum(row.kind != "not repeated" for row in self.rows)
         total = len(self.records)
         if not self.is_checked:
             return f"none of the {total} runs was checked, for the reasons above"
-        rows = f"{wrong} row{'s' * (wrong > 1)} of the table must not be there"
-        result = "nothing differs" if self.holds else rows
+        result = "nothing differs" if self.holds else "the table names what differs or is missing"
         text = f"{self.evaluated} points evaluated and {self.repeated} of {total} runs repeated: {result}"
         if self.repeated == total or not total:
             return text
@@ -168,7 +166,11 @@ def _check_points(spec: ProblemSpec, records: Sequence[RunRecord]) -> Iterator[D
             yield Difference(record.name, "differs", f"its problem is another one here: {difference}")
         if not record.x:
             continue  # repeated, it has no point either
-        values = model.at(problem.check_x(record.x), problem.p)
+        try:
+            values = model.at(problem.check_x(record.x), problem.p)
+        except InputError as error:
+            yield Difference(record.name, "differs", str(error))
+            continue
         stated = {"objective": record.objective, "violation": record.violation, **record.metrics}
         computed = {"objective": sign * values.cost, "violation": values.violation, **values.indexes}
         for name in {**stated, **computed}:

@@ -229,9 +229,16 @@ def _read_dictionary(nlp: Mapping[str, Any], p: Any, bounds: Mapping[str, Any]) 
         raise unknown("key of CasADi's dictionary", min(wrong), ("x", "f", "g", "p"))
     if "x" not in nlp or "f" not in nlp:
         raise InputError("CasADi's dictionary needs at least x and f")
+    for key, value in nlp.items():
+        if not isinstance(value, type(nlp["x"])):
+            raise InputError(f"{key} of CasADi's dictionary must be an expression as x is, got {format_value(value)}")
     symbols, kind = ca.symvar(nlp["x"]), type(nlp["x"])
     g, given = nlp.get("g", kind(0, 1)), nlp.get("p", kind(0, 1))
     n, m = nlp["x"].numel(), g.numel()
+    if free := {s.name() for s in ca.symvar(ca.veccat(nlp["f"], g))} - {
+        s.name() for s in (*symbols, *ca.symvar(given))
+    }:
+        raise InputError(f"f or g contains {min(free)!r}, which is neither in x nor in p")
     ends = {name: _to_column(name, bounds.get(name, sign * math.inf), size)
             for name, sign, size in (("lbx", -1, n), ("ubx", 1, n), ("lbg", -1, m), ("ubg", 1, m))}  # fmt: skip
     entries = [name for symbol in ca.symvar(given) for name in _name_entries(symbol)]
@@ -280,7 +287,7 @@ def _to_column(what: str, values: Any, size: int) -> list[float]:
     """Return one number for each of so many entries; a single one counts for all."""
     numbers = to_floats(what, values).ravel()
     if numbers.size not in (1, size) or (numbers.size == 0 and size):
-        raise InputError(f"{what} must be one number or {size}, got {numbers.size}")
+        raise InputError(f"{what} must be one number{f' or {size}' if size > 1 else ''}, got {numbers.size}")
     return [float(v) for v in np.broadcast_to(numbers, size)]
 
 

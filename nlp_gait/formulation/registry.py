@@ -267,7 +267,8 @@ def _check_texts(owner: str, problem: GaitProblem, assembly: Assembly) -> None:
     texts += [text for quantity in quantities for text in (quantity.name, quantity.unit)]
     texts += [text for group in assembly.constraints for text in (group.name, group.unit, *group.labels)]
     for text in texts:
-        if not isinstance(text, str) or not text.isprintable() or "$" in text:  # a dollar begins a formula
-            raise InputError(f"{owner}: a name, label or unit must be printable text without '$', got {text!r}")
+        if not isinstance(text, str) or not text.strip() or not text.isprintable() or "$" in text:  # $ begins a formula
+            remedy = "printable text without '$', and not blank (the unit of a pure number is '1')"
+            raise InputError(f"{owner}: a name, label or unit must be {remedy}, got {text!r}")
     for text in (problem.title, *(quantity.description for quantity in quantities)):
         check_path(text, f"{owner}: a description, {text[:60]!r}", InputError)

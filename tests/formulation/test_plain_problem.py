@@ -12,6 +12,7 @@ import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.registry import check_mathematics
 
 BEAM = f"{Path(__file__).parents[2] / 'examples' / 'welded_beam.py'}:beam"
 BEST = 1.724852308597366  # of the welded beam: Ragsdell, Phillips (1976); Coello (2000) and many others
@@ -123,7 +124,14 @@ BOX = {"x": (0, 1), "y": (0, 1)}
         ((X + Y,), {"x": BOX, "tolerance": -1.0}, "tolerance must be >= 0, got -1.0"),
         ((X + Y, [True]), {"x": BOX}, "constraint g1 must be a comparison of SX expressions, .*, got True"),
         ((X + Y, [SX(1) <= X / X * 0 + SX.sym("c")]), {"x": BOX, "p": {"c": 1}}, "constraint g1 contains no variable"),
-        (({"x": X, "f": X},), {"lbx": [0, 1], "ubx": 1}, "lbx must be one number or 1, got 2"),
+        (({"x": X, "f": X},), {"lbx": [0, 1], "ubx": 1}, "lbx must be one number, got 2"),
+        (
+            ({"x": X, "f": 3.0},),
+            {"lbx": 0, "ubx": 1},
+            "f of CasADi's dictionary must be an expression as x is, got 3.0",
+        ),
+        (({"x": X, "p": Y, "f": X},), {"lbx": 0, "ubx": 1}, r"p \(y\) must be one number, got 0"),
+        (({"x": X, "f": X * Y},), {"lbx": 0, "ubx": 1}, "f or g contains 'y', which is neither in x nor in p"),
         ((opti_with_an_integer(),), {}, "is an integer variable; problems here are continuous: relax it"),
     ],
 )
@@ -131,3 +139,10 @@ def test_what_is_not_allowed_is_one_sentence(arguments: Any, named: dict[str, An
     with pytest.raises((InputError, UnknownNameError), match=message) as error:
         nlp_gait.problem(*arguments, **named)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["", " ", "a\nb", "$a"])
+def test_a_name_that_no_table_can_show_is_refused(name: str) -> None:
+    symbol = SX.sym(name)
+    with pytest.raises(InputError, match="a name, label or unit must be printable text without '\\$', and not blank"):
+        check_mathematics(nlp_gait.problem({"x": symbol, "f": symbol**2}, lbx=0, ubx=1))

@@ -1,4 +1,4 @@
-"""Progress on a terminal: one line of at most 80 columns that is rewritten; in a log, a line every half minute."""
+"""Progress on a terminal: one line of at most 80 columns that is rewritten; in a log, a line every few seconds."""
 
 import io
 import re
@@ -7,7 +7,7 @@ import time
 import pytest
 
 from compare.cli import printing
-from compare.cli.printing import PlainConsole, format_duration, say, show_progress
+from compare.cli.printing import PlainConsole, format_duration, report_silence, say, show_progress
 
 
 def test_a_line_is_rewritten_and_removed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -27,15 +27,24 @@ def test_a_line_is_rewritten_and_removed(monkeypatch: pytest.MonkeyPatch) -> Non
     assert 2.0 <= float(last.split(", ")[1].split()[0]) <= 10.0  # 5 runs, the only one of this command took 0.3 to 2 s
 
 
-def test_a_log_has_a_line_every_half_minute(monkeypatch: pytest.MonkeyPatch) -> None:
-    written, now = io.StringIO(), [0.0]
-    monkeypatch.setattr(printing, "stderr", PlainConsole(file=written))
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    with show_progress("starts", None) as advance:
-        for second in range(70):
-            now[0] = float(second)
-            advance(f"start {second}")
-    assert written.getvalue().splitlines() == ["starts 31, 30 s, start 30", "starts 61, 60 s, start 60"]
+def test_a_log_has_lines_also_during_one_long_step(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(printing, "LOG_PERIOD_S", 0.1)
+
+    def wait_for(line: str) -> None:
+        lines, start = list[str](), time.monotonic()
+        while line not in lines:
+            assert time.monotonic() < start + 20.0, lines
+            lines = re.sub(r"\d+ s", "_ s", capfd.readouterr().err).splitlines()
+
+    with report_silence("nlp-gait solve"):
+        wait_for("nlp-gait solve is at work, _ s")
+        with show_progress("starts") as advance:
+            wait_for("starts, _ s")
+            advance("start 0")
+            wait_for("starts 1, _ s, start 0")
+        wait_for("nlp-gait solve is at work, _ s")
 
 
 def test_durations_have_two_digits() -> None:

@@ -2,11 +2,13 @@
 
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from compare.study.run import ProblemSpec, Run
+from compare.study.perform import ChangedFileError, judge_search, perform, run_search
+from compare.study.run import ProblemSpec, Run, make_inputs
 from compare.study.study import Study, run_study
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
@@ -81,7 +83,21 @@ def test_a_file_that_changes_while_the_study_runs_ends_it(tmp_path: Path, change
         time.sleep(0.1)
 
     runs = tuple(Run(problem=WALK, solver=f"{tmp_path}/own.py:search", number=k, evaluations=9) for k in (0, 1))
-    with pytest.raises(InputError, match="has changed since the study began; the 1 runs before it are stored: rerun"):
+    with pytest.raises(InputError, match="has changed since the study began: .*; the 1 runs before it are stored: rerun"):
         run_study(Study(runs=runs, folder=tmp_path / "study"), edit)
     records = run_study(Study(runs=runs, folder=tmp_path / "study"))
     assert len({record.inputs.code for record in records}) == 1
+
+
+@pytest.mark.parametrize("edit", [lambda path: path.write_text("SIZE = 9\n"), Path.unlink], ids=["edited", "deleted"])
+def test_no_run_is_solved_or_judged_as_a_problem_that_changed_meanwhile(
+    tmp_path: Path, edit: Callable[[Path], object]
+) -> None:
+    problem = ProblemSpec(name=write(tmp_path, 1))
+    runs = [Run(problem=problem, solver=name, evaluations=50) for name in ("random", "ipopt")]
+    search, ipopt = make_inputs(runs)
+    end = run_search(runs[0], search)
+    edit(tmp_path / "sizes.py")
+    for call in (lambda: judge_search(runs[0], search, end), lambda: perform(runs[1], ipopt)):
+        with pytest.raises(ChangedFileError, match="a file has changed since the study began: "):
+            call()

@@ -66,7 +66,7 @@ Alteration = Callable[[dict[str, Any]], object]
 ALTERATIONS: dict[tuple[str, int], tuple[Alteration, str]] = {
     ("pso", 0): (lambda r: r.update(objective=0.99), "its objective is 0.99, but that of its x is"),
     ("pso", 1): (lambda r: r["metrics"].update({next(iter(r["metrics"])): 7.0}), "is 7, but that of its x is"),
-    ("pso", 2): (lambda r: r["x"].update({next(iter(r["x"])): 0.1}), "but that of its x is"),
+    ("pso", 2): (lambda r: r["x"].popitem(), "must name every variable once"),
     ("ga", 0): (lambda r: r["history"]["objective"].__setitem__(-1, 0.9), "history: recorded"),
     ("ga", 1): (lambda r: r["counts"].update(f=99), "counts: recorded"),
     ("ga", 2): (lambda r: r.update(status="converged"), "status: recorded '\"converged\"'"),
