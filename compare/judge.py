@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from nlp_gait.backends.exact import build_exact_model, find_violated_rows
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, format_value
 from nlp_gait.files import read_json
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
@@ -93,7 +93,7 @@ def evaluate(
 def find_faults(result: Result, path: Path) -> list[str]:
     """Return in words what is wrong with a gait from a file: rows and bounds that it violates, an objective that it has not.
 
-    Raises InputError if its objective is not a finite number.
+    Raises InputError if its objective is not a finite number, or that in the file is not a number.
     """
     problem, stated = result.problem, read_json(path, "result").get("objective")
     model = build_exact_model(problem)
@@ -111,6 +111,9 @@ def find_faults(result: Result, path: Path) -> list[str]:
     if not math.isfinite(value):
         reason = f"result {str(path)!r}: {problem.objective.name} is {value} at this x"
         raise InputError("; ".join(filter(None, (reason, violated))))
+    stated = stated.get("value") if isinstance(stated, dict) else stated
+    if stated is not None and (isinstance(stated, bool) or not isinstance(stated, int | float)):
+        raise InputError(f"result {str(path)!r}: objective must be a number, got {format_value(stated)}")
     if stated is not None and not abs(stated - value) <= SLIGHT * abs(value):
         unit = problem.objective.unit
         sentences.append(f"The file says {problem.objective.name} {stated:.6g} {unit}, and it is {value:.6g} {unit}")

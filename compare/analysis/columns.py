@@ -80,15 +80,15 @@ def compute_of_feasible(
 def compute_of_records(
     statistic: Callable[[list[float]], float], name: str, comparison: Comparison, solver: SolverRuns
 ) -> float:
-    """Return a statistic of a time of all runs [s]; NaN if one is unknown."""
-    times = [getattr(r.time_s, name) for r in solver.records]
-    return math.nan if any(map(math.isnan, times)) else statistic(times)
+    """Return a statistic of a time of the runs with a result [s]; NaN if one is unknown, or there are none."""
+    times = [getattr(r.time_s, name) for r in solver.records if r.x]
+    return math.nan if not times or any(map(math.isnan, times)) else statistic(times)
 
 
 def compute_median_evaluations(comparison: Comparison, solver: SolverRuns) -> float:
-    """Return the median of the equivalent evaluations of a run; NaN if those of a run are unknown."""
-    counts = [curve.total_cost() for curve in solver.curves]
-    return math.nan if any(map(math.isnan, counts)) else median(counts)
+    """Return the median equivalent evaluations of the runs with a result; NaN if those of one are unknown, or without any."""
+    counts = [curve.total_cost() for curve, record in zip(solver.curves, solver.records, strict=True) if record.x]
+    return math.nan if not counts or any(map(math.isnan, counts)) else median(counts)
 
 
 def _make_cost_columns(axis: str, title: str, form: str) -> tuple[Column, ...]:

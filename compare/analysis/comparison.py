@@ -147,9 +147,10 @@ class Comparison:
         """Format a gap in percent, or in the objective's unit from a value near zero; ``FOUND`` is the least one shown."""
         if gap is None:
             return "-"
-        if not is_zero(self.reference) or not math.isfinite(gap) or gap == 0.0:
+        if not is_zero(self.reference) or not math.isfinite(gap):
             return format_gap(gap)
-        return f"< {ZERO:g}" if abs(gap) < ZERO else with_unit(gap, self.objective.unit, ".2g")
+        is_small = 0.0 < abs(gap) < ZERO
+        return "< " * is_small + with_unit(ZERO if is_small else gap, self.objective.unit, ".2g")
 
     def gap(self, cost: float) -> float:
         """Return the distance of a cost from the best known objective, see ``compute_gap``; 0 if better within the tolerance."""

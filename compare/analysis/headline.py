@@ -42,6 +42,8 @@ def write_headline(comparison: Comparison) -> str:
         clauses.insert(0, f"{runs} {verb} {'it' if away else _name_reference(comparison)}")
     if away:
         clauses.insert(0, _describe_away(comparison, away))
+    if not (away or reaching):
+        clauses.append(_describe_best_run(comparison))
     more = len(comparison.solvers) - len(gaps)
     sentence = "; ".join(clauses) + (f", and {more} more: see the table." if more else ".")
     return " ".join(filter(None, (sentence, _write_second(comparison))))
@@ -102,6 +104,15 @@ def _list_doubts(comparison: Comparison, solvers: Sequence[SolverRuns]) -> list[
     return [comparison.compare_with_others(a.name).get(b.name) == 0 for a, b in pairs]
 
 
+def _describe_best_run(comparison: Comparison) -> str:
+    """Return where the best run ends if no solver's median run is feasible."""
+    gap = comparison.gap(min(min(solver.costs) for solver in comparison.solvers))
+    if comparison.known.objective is None:
+        return f"the best run ends at {with_unit(comparison.reference, comparison.objective.unit)}"
+    end = "reaches" if gap <= FOUND else f"ends {_format_distance(comparison, gap)}"
+    return f"the best run {end} {_name_reference(comparison)}"
+
+
 def _count_reaching(comparison: Comparison, solver: SolverRuns) -> str:
     """Return for example ``all 20 IPOPT starts``."""
     reached, runs = comparison.count_reached(solver), len(solver.records)
@@ -113,13 +124,18 @@ def _count_reaching(comparison: Comparison, solver: SolverRuns) -> str:
 
 
 def _describe_failing(solver: SolverRuns) -> str:
-    """Return how many runs of a solver are infeasible or failed, if half of them or more are."""
-    runs, feasible = len(solver.records), len(solver.feasible)
-    if not any(record.x for record in solver.records):
-        return f"{solver.title} fails in {'its only run' if runs == 1 else f'all {runs} runs'}"
-    if not feasible:
-        return f"{solver.title} finds no feasible point in {'its only run' if runs == 1 else f'{runs} runs'}"
-    return f"{solver.title} is infeasible in {runs - feasible} of {runs} runs"
+    """Return in how many runs a solver failed or found no feasible point, if half of them or more."""
+    runs, failed = len(solver.records), sum(not record.x for record in solver.records)
+    infeasible = runs - failed - len(solver.feasible)
+    ends = [("fails", failed), ("ends infeasible", infeasible)]
+    return f"{solver.title} " + join_words(f"{end} in {_count_runs(n, runs)}" for end, n in ends if n)
+
+
+def _count_runs(count: int, runs: int) -> str:
+    """Return for example ``all 5 runs``."""
+    if runs == 1:
+        return "its only run"
+    return f"{count} of {runs} runs" if count < runs else "both runs" if runs == 2 else f"all {runs} runs"
 
 
 def _write_second(comparison: Comparison) -> str:
@@ -164,18 +180,28 @@ def write_overall_headline(comparisons: Sequence[Comparison]) -> str:
     if any(is_zero(comparison.reference) for comparison in comparisons):
         gaps = {}  # in percent of some, and in units of others
     typical = [
-        f"{name_solver(name)} {format_gap(gap) if math.isfinite(gap) else 'mostly infeasible'}"
+        f"{name_solver(name)} {format_gap(gap)}"
         for name, gap in sorted(gaps.items(), key=lambda item: item[1])
+        if math.isfinite(gap)
     ]
     if typical:
         more = f" and {len(typical) - NAMED} more: see the table" if len(typical) > NAMED else ""
         first = ", ".join(typical[:NAMED]) if more else join_words(typical)
         sentences.append(f"Over {len(comparisons)} problems, the median of the median gaps is {first}{more}.")
+    failing = [name_solver(name) for name, gap in gaps.items() if not math.isfinite(gap)]
+    if failing:
+        verb = "finds" if len(failing) == 1 else "find"
+        sentences.append(
+            f"On most of the {len(comparisons)} problems {join_words(failing)} mostly {verb} no feasible point."
+        )
     reached = Counter(s.title for c in comparisons for s in c.solvers if s.feasible and c.gap(s.feasible[0]) <= FOUND)
     best = join_words(f"{name} on {number}" for name, number in reached.most_common(NAMED))
     if best:
-        sentences.append(f"Best known values are reached by {best}.")
-    else:
+        values = (
+            "Best known values" if any(c.known.objective is not None for c in comparisons) else "The best values found"
+        )
+        sentences.append(f"{values} are reached by {best}.")
+    elif typical:
         sentences.append("No best known value is reached.")
     better = join_words(c.problem for c in comparisons if c.better is not None)
     return " ".join([*sentences, *([f"New best known values on {better}."] if better else [])])
@@ -185,7 +211,7 @@ def describe_unknown(comparison: Comparison) -> list[str]:
     """Return a sentence for each solver with runs whose evaluations are unknown."""
     unknown = {s.title: (sum(not r.counts for r in s.records), len(s.records)) for s in comparison.solvers}
     return [
-        f"{name}: the number of evaluations of {count} of {runs} runs is unknown; all statistics of evaluations exclude {name}."
+        f"{name}: the number of evaluations of {_count_runs(count, runs)} is unknown; statistics of evaluations exclude {name}."
         for name, (count, runs) in unknown.items()
         if count
     ]
@@ -197,11 +223,9 @@ def describe_failures(comparison: Comparison) -> list[str]:
     for solver in comparison.solvers:
         failed = [record for record in solver.records if not record.x]
         if failed:
-            runs = (
-                "its only run has" if len(solver.records) == 1 else f"{len(failed)} of {len(solver.records)} runs have"
-            )
+            runs, verb = _count_runs(len(failed), len(solver.records)), "has" if len(solver.records) == 1 else "have"
             sentences.append(
-                f"{comparison.problem}, {solver.title}: {runs} no result (run {failed[0].run} {failed[0].status})"
+                f"{comparison.problem}, {solver.title}: {runs} {verb} no result (run {failed[0].run} {failed[0].status})"
             )
     return sentences
 

@@ -110,8 +110,8 @@ def _describe(solution: Solution) -> Iterator[str | Rows]:
     counts, time = solution.evaluations, solution.time_s
     yield (
         f"{sum(start.converged for start in solution.starts)} of {len(solution.starts)} starts converged; "
-        f"{best.iterations} iterations of the best; calls f {counts.f}, g {counts.g}, gradient {counts.gradient}, "
-        f"Jacobian {counts.jacobian}, Hessian {counts.hessian}"
+        f"{best.iterations} iteration{'s' * (best.iterations != 1)} of the best; calls "
+        f"f {counts.f}, g {counts.g}, gradient {counts.gradient}, Jacobian {counts.jacobian}, Hessian {counts.hessian}"
     )
     yield (
         f"build {time.build:.2f} s, derivatives {time.compile:.2f} s, solve {time.solve:.2f} s; "

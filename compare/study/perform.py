@@ -139,7 +139,7 @@ class IsolatedRun:
         elif isinstance(result, BaseException):
             result = describe_error(result)
         if isinstance(result, str):
-            return make_failed(self.run, self.inputs, result)
+            return make_failed(self.run, self.inputs, result, latest.entries)
         return catch_errors(self.run, self.inputs, lambda: judge_search(self.run, self.inputs, result))
 
 
@@ -185,10 +185,11 @@ def make_record(run: Run, inputs: Inputs, time_s: Times, **results: Any) -> RunR
     )
 
 
-def make_failed(run: Run, inputs: Inputs, reason: str) -> RunRecord:
-    """Return the record of a run without a result."""
-    times = Times(build=0.0, compile=0.0, solve=0.0, objective=0.0)
-    return make_record(run, inputs, times, status=f"failed: {reason}", counts={"f": 0})
+def make_failed(run: Run, inputs: Inputs, reason: str, entries: Sequence[Entry] = ()) -> RunRecord:
+    """Return the record of a run without a result, which has cost what it reported last."""
+    count, _, _, seconds = entries[-1] if entries else (0, 0.0, 0.0, 0.0)
+    times = Times(build=0.0, compile=0.0, solve=seconds, objective=0.0)
+    return make_record(run, inputs, times, status=f"failed: {reason}", counts={"f": count})
 
 
 def _search_reported(run: Run, inputs: Inputs, send: Send) -> SearchEnd | str:

@@ -59,9 +59,10 @@ class Verification(NamedTuple):
         """The result in words, with the chance that altered runs were not among the repeated ones."""
         total = len(self.records)
         if not self.is_checked:
-            return f"none of the {total} runs was checked, for the reasons above"
+            return "no run was checked, for the reasons above"
         result = "nothing differs" if self.holds else "the table names what differs or is missing"
-        text = f"{self.evaluated} points evaluated and {self.repeated} of {total} runs repeated: {result}"
+        points = f"{self.evaluated} point{'s' * (self.evaluated != 1)}"
+        text = f"{points} evaluated and {self.repeated} of {total} runs repeated: {result}"
         if self.repeated == total or not total:
             return text
         chance = compute_chance(total, self.repeated)
@@ -227,7 +228,7 @@ def _repeat(runs: Sequence[tuple[RunRecord, Run]], progress: Callable[[int, int]
     results = run_study(study, lambda _: progress(next(done), len(runs)))
     for (record, _), again in zip(runs, results, strict=True):
         before, now = record.to_json(), again.to_json()
-        for what in (name for name in before if name not in NOT_REPEATED):
+        for what in (name for name in before if name not in NOT_REPEATED and (record.x or name != "counts")):
             a, b = (json.dumps(plain[what], sort_keys=True) for plain in (before, now))
             if a != b:
                 place = next((k for k, pair in enumerate(zip(a, b, strict=False)) if pair[0] != pair[1]), 0)

@@ -115,7 +115,8 @@ class GaitProblem:
 
     def __repr__(self) -> str:
         goal, n = self.objective, len(self.variables)
-        text = f"{self.address}: {goal.sense} {goal.name} [{goal.unit}] over {n} variables, {len(self.own_parameters)} parameters"
+        counts = f"{n} variable{'s' * (n > 1)}, {len(self.own_parameters)} parameters"
+        text = f"{self.address}: {goal.sense} {goal.name} [{goal.unit}] over {counts}"
         return f"<{text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 3] + '...'}>"
 
     def describe(self) -> str:

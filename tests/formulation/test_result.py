@@ -53,7 +53,6 @@ def test_a_solution_is_read_with_its_options_and_parameters(tmp_path):
         ({"problem": "nao-dsp", "x": {**X, "hip_height_m": "tall"}}, "hip_height_m must be a number, got 'tall'"),
         ({"problem": "nao-dsp", "x": {**X, "hip_height_m": float("nan")}}, "hip_height_m' must be finite, got nan"),
         ({"problem": "nao-dsp", "x": X, "paramters": {}}, "unknown key 'paramters'; did you mean 'parameters'"),
-        ({"problem": "nao-dsp", "x": X, "objective": "1.5"}, "objective"),
         ({"problem": "nao-dsp", "x": X, "robot": "nao-v4"}, "write it into 'options'"),
     ],
 )

@@ -37,7 +37,7 @@ def test_a_solver_without_any_run_ends_a_comparison_with_status_1(
     monkeypatch.undo()
     failing(monkeypatch, 2)
     first, last = nlp_gait(*STUDY, "--out", tmp_path, status=1).stderr.splitlines()
-    assert first == "nlp-gait: walk12, PSO: 2 of 2 runs have no result (run 0 failed: RuntimeError: no home)"
+    assert first == "nlp-gait: walk12, PSO: both runs have no result (run 0 failed: RuntimeError: no home)"
     assert last.startswith("nlp-gait: without any result: pso; fix the cause")
     assert "RuntimeError: no home" in (tmp_path / "report.md").read_text()
     again = nlp_gait(*STUDY, "--out", tmp_path, "--json", status=1)

@@ -11,6 +11,7 @@ import pytest
 from casadi import MX
 
 import nlp_gait
+from compare.analysis.columns import format_rows
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import write_headline, write_headlines
 from compare.analysis.record_statistics import find_best_known
@@ -149,9 +150,46 @@ def test_many_problems_have_one_headline() -> None:
     many = [replace(r, problem=f"walk-{k}") for k in range(5) for r in study()]
     (headline,) = write_headlines(compare_problems(many))
     assert headline == (
-        "Over 5 problems, the median of the median gaps is newton 0 %, swarm 5.5 % and colony 18 %. Best known values are "
+        "Over 5 problems, the median of the median gaps is newton 0 %, swarm 5.5 % and colony 18 %. The best values found are "
         "reached by newton on 5."
     )
+    failed = [replace(fail(r), problem=f"walk-{k}") for k in range(5) for r in make_runs(pso=[9.0], ga=[9.0])]
+    assert write_headlines(compare_problems(failed)) == (
+        "On most of the 5 problems GA and PSO mostly find no feasible point.",
+    )
+
+
+def fail(run: RunRecord) -> RunRecord:
+    return replace(run, x={}, feasible=False, objective=np.nan, counts={"f": 30})
+
+
+@pytest.mark.parametrize(
+    ("ends", "failed", "known", "headline"),
+    [
+        ([9.0, 9.5, 9.2], 2, None, "PSO fails in 2 of 3 runs; the best run ends at 9.200000 W."),
+        ([12.0, None, None], 0, PROVEN, "PSO ends infeasible in 2 of 3 runs; the best run ends 20 % above the proven optimum "
+         "10.000000 W."),
+        ([12.0, None, 10.0], 1, PROVEN, "PSO fails in 1 of 3 runs and ends infeasible in 1 of 3 runs; the best run reaches the "
+         "proven optimum 10.000000 W."),
+        ([12.0, 12.0], 2, None, "None of the 2 runs of PSO is feasible: each failed."),
+        ([12.0], 1, None, "The only run, of PSO, failed."),
+        ([12.0], 0, None, "The only PSO run ends at 12.000000 W; no best known value is shipped."),
+    ],
+)  # fmt: skip
+def test_failed_and_infeasible_runs_are_different(
+    ends: list[float | None], failed: int, known: Reference | None, headline: str
+) -> None:
+    runs = [fail(run) if k < failed else run for k, run in enumerate(make_runs(pso=ends))]
+    assert describe(runs, known) == headline
+
+
+def test_medians_of_effort_are_those_of_runs_with_a_result_and_a_gap_from_zero_has_a_unit() -> None:
+    runs = make_runs(pso=[0.0, 0.5, 9.0], ga=[9.0])
+    (comparison,) = compare_problems([fail(run) if run.objective == 9.0 else run for run in runs])
+    header, (pso, ga) = format_rows(comparison)
+    shown = [dict(zip(header, row, strict=True)) for row in (pso, ga)]
+    assert (shown[0]["median evaluations"], shown[0]["best gap"], shown[0]["median gap"]) == ("10", "0 W", "0.5 W")
+    assert (shown[1]["median evaluations"], shown[1]["median time [s]"]) == ("-", "-")
 
 
 def bowl(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:

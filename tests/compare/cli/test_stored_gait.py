@@ -12,7 +12,7 @@ from tests.compare.cli.calls import as_json, one_sentence
 OPTIMUM = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)
 
 
-def write(path: Path, *, objective: float | None = None, robot: str = "nao-v5", **changes: float) -> Path:
+def write(path: Path, *, objective: object = None, robot: str = "nao-v5", **changes: float) -> Path:
     x = dict(zip(nlp_gait.load("nao-ssp").names, OPTIMUM, strict=True)) | changes
     result = {"problem": "nao-ssp", "options": {"robot": robot}, "x": x}
     path.write_text(json.dumps(result if objective is None else result | {"objective": objective}))
@@ -37,7 +37,9 @@ def test_violations_and_false_objectives_are_named(
 
 
 def test_a_gait_without_an_objective_is_refused(tmp_path: Path) -> None:
-    path = write(tmp_path / "gait.json", hip_height_m=1e308)
+    path = write(tmp_path / "gait.json", objective="0.5")
+    assert "objective must be a number, got '0.5'" in one_sentence("export", path, "--to", "csv")
+    write(path, hip_height_m=1e308)
     assert "power is nan at this x; bounds[hip_height_m] = 1e+308 m" in one_sentence("export", path, "--to", "csv")
 
 

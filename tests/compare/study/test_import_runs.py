@@ -109,8 +109,8 @@ def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_pat
     assert rows[-1][header.index("median evaluations")] == "-"
     page = " ".join((out / "report.md").read_text().split())
     assert not re.search(r"\bnan\b", page, re.IGNORECASE)
-    for solver, count in (("paper", 2), ("thesis", 3)):
-        sentence = f"{solver}: the number of evaluations of {count} of 3 runs is unknown; all statistics of evaluations exclude"
+    for solver, count in (("paper", "2 of 3"), ("thesis", "all 3")):
+        sentence = f"{solver}: the number of evaluations of {count} runs is unknown; statistics of evaluations exclude"
         assert sentence in page and sentence in describe_unknown(comparison)[solver == "thesis"]
     with open(out / "runs.csv") as file:
         rows = [r for r in csv.DictReader(file) if r["solver"] == "paper"]

@@ -77,7 +77,7 @@ ALTERATIONS: dict[tuple[str, int], tuple[Alteration, str]] = {
 def test_a_study_of_which_nothing_is_checked_is_said_to_be_unchecked(sound: Path) -> None:
     rows, (records, _) = [Difference("pso, run 0", "not repeated", "its code is not named")], read_records(sound)
     verification = Verification(rows=rows, records=records, repeated=0, evaluated=0)
-    assert verification.sentence == "none of the 7 runs was checked, for the reasons above"
+    assert verification.sentence == "no run was checked, for the reasons above"
     assert not verification.holds
 
 
@@ -177,9 +177,7 @@ def test_a_packed_robot_stands_for_the_authors_file(tmp_path: Path, monkeypatch:
     archive = pack_study(study, read_records(study)[0], tmp_path / "study.zip")
     robot.unlink()
     unpack_archive(archive, tmp_path / "unpacked")
-    assert (
-        verify_study(tmp_path / "unpacked").sentence == "1 points evaluated and 1 of 1 runs repeated: nothing differs"
-    )
+    assert verify_study(tmp_path / "unpacked").sentence == "1 point evaluated and 1 of 1 runs repeated: nothing differs"
 
 
 def bomb(path: Path) -> None:
