@@ -83,7 +83,9 @@ def test_a_file_that_changes_while_the_study_runs_ends_it(tmp_path: Path, change
         time.sleep(0.1)
 
     runs = tuple(Run(problem=WALK, solver=f"{tmp_path}/own.py:search", number=k, evaluations=9) for k in (0, 1))
-    with pytest.raises(InputError, match="has changed since the study began: .*; the 1 runs before it are stored: rerun"):
+    with pytest.raises(
+        InputError, match="has changed since the study began: .*; the 1 runs before it are stored: rerun"
+    ):
         run_study(Study(runs=runs, folder=tmp_path / "study"), edit)
     records = run_study(Study(runs=runs, folder=tmp_path / "study"))
     assert len({record.inputs.code for record in records}) == 1
