@@ -84,8 +84,13 @@ def _tabulate(settings: Mapping[str, Setting]) -> Iterator[str]:
 def _summarise(rows: list[TunedGait]) -> Iterator[str]:
     scores = [score for row in rows for score in (row.here, *row.elsewhere)]
     yield f"{rows[0].simulations}"
-    yield f"{np.median([row.here.J_per_m for row in rows]):.2f}"
-    yield f"{np.median([row.elsewhere_J_per_m for row in rows]):.2f}"
+    yield _format_median([row.here.J_per_m for row in rows if row.here.fell_at_s is None])
+    yield _format_median([row.elsewhere_J_per_m for row in rows if not np.isnan(row.elsewhere_J_per_m)])
     yield f"{np.median([row.model_J_per_m for row in rows]):.2f}"
     yield f"{sum(score.fell_at_s is not None for score in scores)} of {len(scores)}"
     yield f"{len(rows)}"
+
+
+def _format_median(energies: Sequence[float]) -> str:
+    """Format the median of the gaits that stand."""
+    return f"{np.median(energies):.2f}" if energies else "-"

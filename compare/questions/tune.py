@@ -1,6 +1,7 @@
 """What is a search worth where the simulator scores? IPOPT's gaits of the model beside searches in the engine."""
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
@@ -28,8 +29,9 @@ HELD_OUT_M = 0.001  # height of their bumps, for gaits that are tuned on a calm 
 MODEL, TUNED, CONTINUED = "IPOPT", "IPOPT+limits", "IPOPT+CMA"
 NEARBY = 0.02  # first standard deviation of CMA from IPOPT's optimum, as a share of each variable's range
 CAPTION = (
-    f"After {{}} in the engine; held out: three other floors. {MODEL}: the optimum of the model; {TUNED}: with limits tuned in "
-    f"the engine; {CONTINUED}: CMA from the optimum with a first standard deviation of {100 * NEARBY:g} % of each range"
+    f"After {{}} in the engine; held out: mean over three other floors, where it stands. {MODEL}: the optimum of the model; "
+    f"{TUNED}: with limits tuned in the engine; {CONTINUED}: CMA from the optimum with a first standard deviation of "
+    f"{100 * NEARBY:g} % of each range"
 )
 CURVES = "Least energy of a gait that does what it may, over simulations, by the score of the search"
 
@@ -52,8 +54,9 @@ class TunedGait:
 
     @property
     def elsewhere_J_per_m(self) -> float:
-        """Mean energy on the held-out floors."""
-        return float(np.mean([score.J_per_m for score in self.elsewhere]))
+        """Mean energy on the held-out floors on which it stands; NaN if it falls on all."""
+        standing = [score.J_per_m for score in self.elsewhere if score.fell_at_s is None]
+        return float(np.mean(standing)) if standing else math.nan
 
 
 COLUMNS: Mapping[str, Callable[[TunedGait], str]] = {
@@ -62,7 +65,7 @@ COLUMNS: Mapping[str, Callable[[TunedGait], str]] = {
     "J/m": lambda row: (
         f"{row.here.J_per_m:.2f}" if row.here.fell_at_s is None else f"falls at {row.here.fell_at_s:.1f} s"
     ),
-    "held-out J/m": lambda row: f"{row.elsewhere_J_per_m:.2f}",
+    "held-out J/m": lambda row: "-" if math.isnan(row.elsewhere_J_per_m) else f"{row.elsewhere_J_per_m:.2f}",
     "falls": lambda row: f"{sum(s.fell_at_s is not None for s in (row.here, *row.elsewhere))} of {1 + len(HELD_OUT)}",
     "model J/m": lambda row: f"{row.model_J_per_m:.2f}",
     "model's rows violated": lambda row: f"{row.rows_violated}",
