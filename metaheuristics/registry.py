@@ -9,7 +9,7 @@ from typing import TypeVar
 from metaheuristics.adapters.cma import CmaEs
 from metaheuristics.adapters.pymoo import MODULES, Pymoo
 from metaheuristics.algorithms.ant_colony import AntColony, AntColonyGrid
-from metaheuristics.algorithms.differential_evolution import DifferentialEvolution, LShade
+from metaheuristics.algorithms.differential_evolution import DifferentialEvolution
 from metaheuristics.algorithms.genetic import GeneticAlgorithm, GoswamiGeneticAlgorithm
 from metaheuristics.algorithms.particle_swarm import ConstantInertiaSwarm, ParticleSwarm
 from metaheuristics.algorithms.random_search import RandomSearch
@@ -27,7 +27,6 @@ ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = {
     "aco": AntColony,
     "aco-grid": AntColonyGrid,
     "de": DifferentialEvolution,
-    "lshade": LShade,
     "random": RandomSearch,
 }
 """This package's own algorithms."""

@@ -51,7 +51,7 @@ def climbs() -> Iterator[tuple[str, Result]]:
     times = {name: value for name, value in STAIRS_TABLE_3.items() if name in plan.names}
     times["torso_pitch_rad"] = case_2.torso_pitch_rad
     for label, fixed in (("", times), (", hip height free", {k: v for k, v in times.items() if k != "hip_height_m"})):
-        yield f"plan, paper's Table III{label}", _at(plan, nlp_gait.solve(plan, starts=2, seed=0, fix=fixed).x)
+        yield f"plan, paper's Table III{label}", _at(plan, nlp_gait.solve(plan.fix(**fixed), starts=2, seed=0).x)
     printed_loop = track.with_values(gravity_compensation=0.0)
     yield "tracked, paper's gains", _at(printed_loop, (case_2.kp, case_2.kd, case_2.torso_pitch_rad))
     yield "tracked, optimum", _at(track, nlp_gait.solve(track, starts=1, seed=0).x)

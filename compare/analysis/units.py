@@ -20,7 +20,6 @@ SMALL, LARGE = 5e-7, 1e12  # six decimals show zero for less, and digits without
 SOLVERS = {
     **{name: name.upper() for name in ("ipopt", "slsqp", "pso", "ga", "aco", "de", "abc", "sa", "es")},
     "cma": "CMA-ES",
-    "lshade": "L-SHADE",
     "random": "random search",
 }
 

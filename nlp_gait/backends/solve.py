@@ -37,7 +37,6 @@ def solve(
     starts: int = 1,
     seed: int = 0,
     x0: Sequence[float] | Array | Mapping[str, float] | None = None,
-    fix: Mapping[str, float] | None = None,
     solver: Solver | None = None,
     progress: Callable[[Outcome], None] | None = None,
     workers: int | None = None,
@@ -50,7 +49,6 @@ def solve(
         seed: of the start points.
         x0: first start point (n,) within the bounds, in order or by name; a fixed variable takes its fixed value. The remaining
             ``starts - 1`` are random.
-        fix: values of variables that are fixed, by name.
         solver: with its settings; None for IPOPT with its defaults.
         progress: called with the outcome of each start, in their order.
         workers: number of processes that share the starts; None for all processors where a process can be forked (Linux, in the
@@ -67,8 +65,7 @@ def solve(
     workers = None if workers is None else check_count("workers", workers, at_most=MOST_WORKERS)
     seed = check_count("seed", seed, at_least=0)
     problem = load(problem) if isinstance(problem, str) else problem
-    _check_types(problem, fix, solver, progress)
-    problem = problem.fix(**(fix or {}))
+    _check_types(problem, solver, progress)
     rng = np.random.default_rng(seed)
     points = [problem.start_point(rng) for _ in range(starts)]
     if x0 is not None:
@@ -87,11 +84,9 @@ def solve(
     return solution
 
 
-def _check_types(problem: object, fix: object, solver: object, progress: object) -> None:
+def _check_types(problem: object, solver: object, progress: object) -> None:
     if not isinstance(problem, GaitProblem):
         raise InputError(f"problem must be a problem from load, or the name of one, got {format_value(problem)}")
-    if fix is not None and not (isinstance(fix, Mapping) and all(isinstance(name, str) for name in fix)):
-        raise InputError(f"fix must be values by variable name, got {format_value(fix)}")
     is_solver = all(callable(getattr(solver, method, None)) for method in ("run", "prepare"))
     if solver is not None and (isinstance(solver, type) or not is_solver):
         raise InputError(

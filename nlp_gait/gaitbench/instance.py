@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import asdict
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -60,27 +60,18 @@ class Instance:
     It is picklable, and may be called from several threads and processes at once.
     """
 
-    def __init__(self, id: str, *, unit_cube: bool = False) -> None:
+    def __init__(self, id: str) -> None:
         """Use ``gaitbench.load`` instead."""
         self.id = id  #: its name, which never changes
-        self.unit_cube = unit_cube  #: whether x runs from 0 to 1 instead of in physical units
         self.definition = define(id)  #: what it is made from
         self.gait_problem: GaitProblem = gaitbench(instance=id)
         self.names = self.gait_problem.names  #: (n,) variables
-        self._origin = self.gait_problem.lower
-        self._width = self.gait_problem.upper - self._origin
-        self._slope = self._width if unit_cube else np.ones(len(self.names))  # physical variables by x
-        #: (n,) of the variables; all ``"1"`` in the unit cube
-        self.units = tuple("1" if unit_cube else variable.unit for variable in self.gait_problem.variables)
-        #: (n,) bounds
-        self.lower = np.zeros(len(self.names)) if unit_cube else np.array(self.gait_problem.lower)
-        #: (n,) bounds
-        self.upper = np.ones(len(self.names)) if unit_cube else np.array(self.gait_problem.upper)
-        for array in (self.lower, self.upper):
-            array.setflags(write=False)
+        self.units = tuple(variable.unit for variable in self.gait_problem.variables)  #: (n,) of the variables
+        self.lower = self.gait_problem.lower  #: (n,) bounds
+        self.upper = self.gait_problem.upper  #: (n,) bounds
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return partial(load, self.id, unit_cube=self.unit_cube), ()
+        return load, (self.id,)
 
     def __repr__(self) -> str:
         return f"<GaitBench {self.id}: {len(self.names)} variables, {len(self.row_names)} inequalities>"
@@ -92,30 +83,30 @@ class Instance:
             (P,) objective, to be minimised; and (P,) violation: the sum of all rows' positive parts and of what exceeds the
             bounds, in units of each scale, zero if and only if the point is feasible. Both are infinite where x is not finite.
         """
-        return self._objective(self._physical(X))
+        return self._objective(X)
 
     def objective(self, x: Array | Sequence[float]) -> float:
         """Return the objective at one point x (n,), to be minimised."""
-        return self._objective.point(self._physical(np.asarray(x, dtype=float)))[0]
+        return self._objective.point(x)[0]
 
     def violation(self, x: Array | Sequence[float]) -> float:
         """Return the total violation at one point x (n,): zero if and only if it is feasible."""
-        return self._objective.point(self._physical(np.asarray(x, dtype=float)))[1]
+        return self._objective.point(x)[1]
 
     def rows(self, X: Array) -> Array:
         """Return the rows G(X) (P, m), satisfied where <= 0, in units of each row's scale; ``row_names`` has their names."""
-        return self.sides(self._objective.constraints(self._physical(X)))
+        return self.sides(self._objective.constraints(X))
 
     def gradient(self, x: Array) -> Array:
         """Return the gradient (n,) of the objective at x (n,); at a kink, a one-sided one."""
         gradient, _ = self._derivatives(self._point(x), self.gait_problem.p)
-        return np.array(gradient).ravel() * self._slope
+        return np.array(gradient).ravel()
 
     def jacobian(self, x: Array) -> Array:
         """Return the derivatives (m, n) of the rows at x (n,); at a kink, one-sided ones."""
         _, jacobian = self._derivatives(self._point(x), self.gait_problem.p)
         sides = self.sides
-        return np.array(jacobian)[sides.row] * (sides.sign * sides.weight)[:, None] * self._slope
+        return np.array(jacobian)[sides.row] * (sides.sign * sides.weight)[:, None]
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -135,8 +126,7 @@ class Instance:
     @property
     def best_x(self) -> Array:
         """(n,) point of the best known objective."""
-        x = np.array(self.facts.best_x)
-        return (x - self._origin) / self._width if self.unit_cube else x
+        return np.array(self.facts.best_x)
 
     @property
     def evidence(self) -> Evidence:
@@ -171,39 +161,35 @@ class Instance:
         with _BUILDING:
             return self.gait_problem.build_once(_build_derivatives)
 
-    def _physical(self, X: Array) -> Array:
-        return self._origin + np.asarray(X, dtype=float) * self._width if self.unit_cube else X
-
     def _point(self, x: Array) -> Array:
         array = np.asarray(x, dtype=float)
         if array.shape != (len(self.names),):
             raise InputError(f"x of {self.id} must have {len(self.names)} values, got shape {array.shape}")
-        return np.asarray(self._physical(array))
+        return array
 
 
-def load(id: str, *, unit_cube: bool = False) -> Instance:
-    """Load an instance by its id, in the unit cube or in physical units; raises UnknownNameError."""
+def load(id: str) -> Instance:
+    """Load an instance by its id; raises UnknownNameError."""
     check_name("instance", id)
-    return _load(id, bool(unit_cube))
+    return _load(id)
 
 
-def generate(family: str, seed: int, *, unit_cube: bool = False) -> Instance:
+def generate(family: str, seed: int) -> Instance:
     """Draw an instance of GaitBench 2 from a family; the same seed gives the same one on every machine.
 
     Args:
         family: one of ``list_families()``.
         seed: 0 or above.
-        unit_cube: whether x runs from 0 to 1; generated instances always do.
 
     Raises UnknownNameError, or InputError if the seed is not a whole number from 0 to 1e12.
     """
-    return load(make_id(family, seed), unit_cube=unit_cube)
+    return load(make_id(family, seed))
 
 
 @lru_cache(maxsize=128)
-def _load(id: str, unit_cube: bool) -> Instance:
+def _load(id: str) -> Instance:
     with _BUILDING:
-        return Instance(id, unit_cube=unit_cube)
+        return Instance(id)
 
 
 def _build_derivatives(problem: GaitProblem) -> ca.Function:

@@ -176,7 +176,6 @@ ENDS = {
     "ga-generational": (1e-3, 0.01, 0.01),
     "ga-goswami": (9.0, 3.0, 0.7),
     "cma": (1e-10, 1e-10, 1e-6),
-    "lshade": (1e-7, 1e-9, 4e-6),
     "de": (1e-8, 1e-8, 1e-6),
     "pymoo:GA": (1e-3, 0.03, 0.01),
     "pymoo:PSO": (1e-6, 1e-3, 1e-3),

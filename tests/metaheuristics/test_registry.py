@@ -1,4 +1,4 @@
-"""Algorithms of other packages, differential evolution and L-SHADE; settings that are refused, and how it is said."""
+"""Algorithms of other packages, and differential evolution; settings that are refused, and how it is said."""
 
 import sys
 import warnings
@@ -32,9 +32,6 @@ from metaheuristics.adapters.pymoo import MODULES, Pymoo
 from metaheuristics.algorithms.differential_evolution import (
     STRATEGIES,
     DifferentialEvolution,
-    LShade,
-    compute_gains,
-    compute_lehmer_mean,
 )
 from metaheuristics.algorithms.genetic import GoswamiGeneticAlgorithm
 from metaheuristics.interface import FEASIBILITY, Array, Start
@@ -42,10 +39,10 @@ from tests.metaheuristics.problems import disc, sphere
 
 
 def test_a_package_that_is_missing_is_named_and_left_out_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert {"lshade", "cma", "pymoo:GA"} <= set(list_installed_algorithms())
+    assert {"de", "cma", "pymoo:GA"} <= set(list_installed_algorithms())
     for package in ("cma", "pymoo"):
         monkeypatch.setitem(sys.modules, package, None)
-    assert "lshade" in list_installed_algorithms() and not {"cma", "pymoo:GA"} & set(list_installed_algorithms())
+    assert "de" in list_installed_algorithms() and not {"cma", "pymoo:GA"} & set(list_installed_algorithms())
     for name, package in (("cma", "cma"), ("pymoo:GA", "pymoo")):
         with pytest.raises(
             SearchError, match=rf"'{name}' needs the package {package}.*pip install 'nlp-gait\[algorithms\]'"
@@ -107,33 +104,6 @@ def test_cma_restarts_with_a_growing_population() -> None:
     assert 20 in sizes
 
 
-def test_the_population_of_lshade_shrinks_to_four() -> None:
-    problem = sphere(2)
-    minimize(problem, make_algorithm("lshade", population=40), evaluations=1000)
-    assert problem.calls[0] == 40 and problem.calls[-2] <= 5
-    assert all(after <= before for before, after in zip(problem.calls, problem.calls[1:], strict=False))
-
-
-def test_means_and_gains_of_lshade_by_hand() -> None:
-    assert compute_lehmer_mean(np.array([0.2, 0.6]), np.array([1.0, 3.0])) == pytest.approx(
-        (0.04 + 3 * 0.36) / (0.2 + 1.8)
-    )
-    assert compute_lehmer_mean(np.zeros(2), np.ones(2)) == 0.0
-    before = np.array([4.0, 2.0, 0.0, 0.0]), np.array([1.0, 1.0, 10.0, 10.0])
-    after = np.array([0.0, 1.0, 0.0, 0.0]), np.array([9.0, 9.0, 5.0, 8.0])
-    np.testing.assert_allclose(compute_gains(before, after), [1.0, 0.25, 1.0, 0.4])
-
-
-def test_the_first_trials_of_lshade_cross_half_of_the_variables() -> None:
-    """Its memory of rates begins at 0.5 (Tanabe and Fukunaga 2014, section III)."""
-    lower, upper = np.zeros(200), np.ones(200)
-    members = np.random.default_rng(3).uniform(lower, upper, (100, 200))
-    start = Start(lower=lower, upper=upper, initial=members, evaluations=10**6, rng=np.random.default_rng(4))
-    search = make_algorithm("lshade", population=100).start(start)
-    search.tell(search.ask(), np.arange(100.0), np.zeros(100), FEASIBILITY)
-    assert np.mean(search.ask() != members) == pytest.approx(0.5, abs=0.05)
-
-
 @pytest.mark.parametrize(
     ("factory", "settings", "message"),
     [
@@ -145,7 +115,6 @@ def test_the_first_trials_of_lshade_cross_half_of_the_variables() -> None:
         (AntColony, {"archive": 1}, "archive must be a whole number >= 2"),
         (AntColonyGrid, {"population": 4, "depositors": 6}, "depositors must be .* <= 5"),
         (DifferentialEvolution, {"population": 4}, "population must be a whole number >= 5"),
-        (LShade, {"best": 0.0}, "best must be a finite number > 0.0 and <= 1.0, got 0.0"),
         (CmaEs, {"growth": 0.5}, "CmaEs: growth must be a finite number >= 1.0, got 0.5"),
         (partial(Pymoo, algorithm="GA"), {"population": 1}, "population"),
         (StaticPenalty, {"weight": 0.0}, r"StaticPenalty: weight must be a finite number > 0\.0, got 0\.0"),

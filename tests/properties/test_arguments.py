@@ -41,7 +41,6 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "starts": (lambda value: solve(PROBLEM, starts=value), ()),
     "seed": (lambda value: solve(PROBLEM, seed=value), (10**40,)),
     "x given as x0": (lambda value: solve(PROBLEM, x0=value), (None,)),
-    "fix": (lambda value: solve(PROBLEM, fix=value), (None, {})),
     "solver": (lambda value: solve(PROBLEM, solver=value), (None,)),
     "progress": (lambda value: solve(PROBLEM, progress=value), (None, type)),
     "problem of compile_objective": (compile_objective, ()),

@@ -83,7 +83,7 @@ def on_a_line(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constr
 
 @pytest.mark.parametrize(("fix", "expected"), [({}, "most"), ({"x": 0.1}, "bounds[x]")])
 def test_equations_are_left_out(fix: dict[str, float], expected: str) -> None:
-    solution = solve(toy(on_a_line), x0=[0.1, 0.1], fix=fix)
+    solution = solve(toy(on_a_line).fix(**fix), x0=[0.1, 0.1])
     assert solution.converged, solution.status
     assert [(bound.name, bound.side) for bound in solution.active_constraints] == [(expected, "upper")]
 
@@ -169,7 +169,7 @@ def test_a_start_outside_the_bounds_is_refused_and_one_on_them_but_for_rounding_
             solve(problem, x0=outside)
     assert solve(problem, x0=[2.0 + 1e-9, 0.0]).starts[0].x0.tolist() == [2.0, 0.0]
     # A variable that is fixed is where it is fixed.
-    assert solve(problem, x0=[9.0, 0.0], fix={"x": 1.0}).starts[0].x0.tolist() == [1.0, 0.0]
+    assert solve(problem.fix(x=1.0), x0=[9.0, 0.0]).starts[0].x0.tolist() == [1.0, 0.0]
 
 
 def test_widths_of_ones_own_narrow_from_stage_to_stage() -> None:
