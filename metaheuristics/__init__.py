@@ -3,7 +3,7 @@
 Independent of any problem and of CasADi: an objective is anything that follows `BatchObjective`.
 
     result = minimize(objective, ParticleSwarm(population=50), evaluations=10_000, seed=1)
-    result = minimize(objective, make_algorithm("ga", survival="generational"), handling=EpsilonLevel())
+    result = minimize(objective, make_algorithm("ga", survival="generational"), handling=StaticPenalty(weight=2.0))
 """
 
 from metaheuristics.algorithms.ant_colony import AntColony, AntColonyGrid
@@ -16,7 +16,6 @@ from metaheuristics.interface import (
     BatchObjective,
     ConstraintHandling,
     Deb,
-    EpsilonLevel,
     History,
     Interrupted,
     Result,
@@ -45,7 +44,6 @@ __all__ = [
     "BatchObjective",
     "ConstraintHandling",
     "Deb",
-    "EpsilonLevel",
     "Flip",
     "GeneticAlgorithm",
     "History",

@@ -168,7 +168,6 @@ class _Run:
     time_limit_s: float | None = None
     point: Callable[[Array], tuple[float, float]] | None = None  # see ``Evaluate``
     reasons: list[str] = field(default_factory=list)
-    initial_violation: Array | None = None
     lock: AbstractContextManager[object] = field(default_factory=Lock)  # a function may call from several threads
 
     def __call__(self, points: Array) -> tuple[Array, Array, Rule]:
@@ -176,11 +175,9 @@ class _Run:
         with self.lock:
             self._check_end()  # a function ignored the first `Ended`
             f, violation = self.record(points[: self.evaluations - self.record.evaluations])
-            if self.initial_violation is None:
-                self.initial_violation = violation
             self._list_reasons()
             self._check_end()
-            return f, violation, self.handling.rule(self.record.evaluations / self.evaluations, self.initial_violation)
+            return f, violation, self.handling.rule()
 
     def evaluate_point(self, x: Array) -> tuple[float, float]:
         """Evaluate one point (n,), as ``__call__`` does."""

@@ -3,6 +3,7 @@
 import difflib
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from functools import partial
 from typing import TypeVar
 
@@ -14,7 +15,7 @@ from metaheuristics.algorithms.genetic import GeneticAlgorithm, GoswamiGeneticAl
 from metaheuristics.algorithms.particle_swarm import ConstantInertiaSwarm, ParticleSwarm
 from metaheuristics.algorithms.random_search import RandomSearch
 from metaheuristics.errors import SearchError, abbreviate, check_installed, is_installed
-from metaheuristics.interface import Algorithm, ConstraintHandling, Deb, EpsilonLevel, StaticPenalty
+from metaheuristics.interface import Algorithm, ConstraintHandling, Deb, StaticPenalty
 
 T = TypeVar("T")
 
@@ -60,15 +61,14 @@ def list_installed_algorithms() -> tuple[str, ...]:
 
 
 def make_handling(text: str, /) -> ConstraintHandling:
-    """Make a constraint handling from `deb`, `epsilon` or `penalty=WEIGHT`; raises SearchError for another text."""
-    name, _, weight = text.partition("=") if isinstance(text, str) else ("", "", "")
-    try:
-        return (
-            StaticPenalty(weight=float(weight)) if name == "penalty" else {"deb": Deb, "epsilon": EpsilonLevel}[text]()
-        )
-    except (KeyError, TypeError, ValueError):
-        allowed = "deb, epsilon or penalty=WEIGHT, a number > 0; no weight suits every problem"
-        raise SearchError(f"constraint handling must be {allowed}, got {abbreviate(text)}") from None
+    """Make a constraint handling from `deb` or `penalty=WEIGHT`; raises SearchError for another text."""
+    if isinstance(text, str) and text == "deb":
+        return Deb()
+    if isinstance(text, str) and text.startswith("penalty="):
+        with suppress(ValueError):
+            return StaticPenalty(weight=float(text.removeprefix("penalty=")))
+    allowed = "deb or penalty=WEIGHT, a number > 0; no weight suits every problem"
+    raise SearchError(f"constraint handling must be {allowed}, got {abbreviate(text)}")
 
 
 def make_by_name(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settings: Mapping[str, object]) -> T:

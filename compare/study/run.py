@@ -146,7 +146,7 @@ class Run:
     #: function (see ``metaheuristics.to_algorithm``)
     solver: str | Algorithm | Callable[..., object]
     settings: Mapping[str, Any] = field(default_factory=dict)  #: of the named solver, that differ from its defaults
-    handling: str = "deb"  #: of constraints, in searches: deb, epsilon or penalty=WEIGHT
+    handling: str = "deb"  #: of constraints, in searches: deb or penalty=WEIGHT
     evaluations: int = EVALUATIONS  #: budget of a search and of SLSQP; other NLP solvers end by themselves
     time_limit_s: float | None = None  #: wall time [s]
     seed: int = 0  #: of the study

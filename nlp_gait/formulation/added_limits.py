@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from nlp_gait import user_code
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.providers import LIMITS, import_object
 
@@ -49,15 +50,11 @@ def parse_limits(value: str | AddedLimits) -> AddedLimits:
 
 def resolve_limits(text: str, owner: str) -> str:
     """Return names of limits in a data file (the owner) as the user gave them; raises as ``resolve_code``."""
-    import nlp_gait.user_code as user_code
-
     return ",".join(prefix + user_code.resolve_code(name, "limit", owner) for prefix, name in split_names(text))
 
 
 def hash_limits(text: str) -> str:
     """Return the hashes of user code among names of limits, or an empty text."""
-    import nlp_gait.user_code as user_code
-
     references = [name for _, name in split_names(text) if user_code.is_reference(name)]
     return ",".join(user_code.read_source_files(name, "limit").digest for name in references)
 
@@ -74,8 +71,6 @@ def split_names(text: str) -> list[tuple[str, str]]:
 def _load_limit(name: str) -> Any:
     if name in LIMITS:
         return import_object(LIMITS[name])()
-    import nlp_gait.user_code as user_code
-
     if not user_code.is_user_code(name, "limit"):
         raise unknown("limit", name, [*LIMITS, *user_code.find_entry_points("limit")])
     user_code.allow_code(name)

@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 from casadi import MX, Function, vertcat
 
+from nlp_gait import user_code
 from nlp_gait.decoding import find_groups, list_options, pack_options, replace_signature
 from nlp_gait.errors import InputError, check_name, describe_type, format_value, unknown
 from nlp_gait.files import check_path
@@ -81,16 +82,12 @@ def find_maker(name: str) -> Maker:
     """
     if name in PROBLEMS:
         return import_object(PROBLEMS[name])
-    import nlp_gait.user_code as user_code
-
     if user_code.is_user_code(name, "problem"):
         return _load_user_maker(name)
     raise unknown("problem", name, [*PROBLEMS, *user_code.find_entry_points("problem")])
 
 
 def _load_user_maker(name: str) -> Maker:
-    import nlp_gait.user_code as user_code
-
     user_code.allow_code(name)
     files = user_code.read_source_files(name, "problem")
     loaded: Any = user_code.load_object(name, "problem", files)
@@ -132,8 +129,6 @@ class UserMaker:
 
     def __call__(self, **options: Any) -> GaitProblem:
         """Return the problem; raise InputError if its source has changed."""
-        import nlp_gait.user_code as user_code
-
         if user_code.read_source_files(self.name, "problem").digest != self.source:
             raise InputError(f"{self.name!r} has changed since the problem was pickled; load it again")
         return load(self.name, **options)
@@ -164,8 +159,6 @@ def check_options(make: Maker, options: Mapping[str, Any]) -> None:
 def resolve_stored(name: str, options: Mapping[str, Any], owner: str) -> tuple[str, dict[str, Any]]:
     """Return name and options of a problem in a data file (the owner), with user code as it was named; see ``resolve_code``."""
     limits = {"limits": resolve_limits(str(options["limits"]), owner)} if options.get("limits") else {}
-    import nlp_gait.user_code as user_code
-
     return user_code.resolve_code(name, "problem", owner), {**options, **limits}
 
 

@@ -11,7 +11,6 @@ import pytest
 from metaheuristics import (
     ALGORITHMS,
     Deb,
-    EpsilonLevel,
     GeneticAlgorithm,
     Result,
     StaticPenalty,
@@ -63,10 +62,8 @@ def test_a_run_uses_its_budget_and_repeats_with_its_seed(algorithm: Algorithm) -
 
 
 @every_algorithm
-@pytest.mark.parametrize("handling", [Deb(), StaticPenalty(weight=0.5), EpsilonLevel()], ids=lambda h: h.name)
-def test_best_never_gets_worse_and_is_one_of_the_evaluated(
-    algorithm: Algorithm, handling: Deb | StaticPenalty | EpsilonLevel
-) -> None:
+@pytest.mark.parametrize("handling", [Deb(), StaticPenalty(weight=0.5)], ids=lambda h: h.name)
+def test_best_never_gets_worse_and_is_one_of_the_evaluated(algorithm: Algorithm, handling: Deb | StaticPenalty) -> None:
     seen: list[tuple[float, float, tuple[float, ...]]] = []
 
     def callback(X: Array, f: Array, violation: Array) -> None:
@@ -79,9 +76,9 @@ def test_best_never_gets_worse_and_is_one_of_the_evaluated(
 
 
 @every_algorithm
-@pytest.mark.parametrize("handling", [Deb(), StaticPenalty(weight=0.5), EpsilonLevel()], ids=lambda h: h.name)
+@pytest.mark.parametrize("handling", [Deb(), StaticPenalty(weight=0.5)], ids=lambda h: h.name)
 def test_some_failed_evaluations_are_counted_and_never_best(
-    algorithm: Algorithm, handling: Deb | StaticPenalty | EpsilonLevel
+    algorithm: Algorithm, handling: Deb | StaticPenalty
 ) -> None:
     def function(X: Array) -> tuple[Array, Array]:
         f = ((X - 0.3) ** 2).sum(axis=1)
@@ -190,8 +187,7 @@ def test_sphere_and_rosenbrock_converge(name: str) -> None:
 
 
 @converging
-@pytest.mark.parametrize("handling", [Deb(), EpsilonLevel()], ids=lambda h: h.name)
-def test_constrained_optimum_is_found(name: str, handling: Deb | EpsilonLevel) -> None:
-    result = minimize(disc(), ALL[name](), evaluations=EVALUATIONS[name], seed=1, handling=handling)
+def test_constrained_optimum_is_found(name: str) -> None:
+    result = minimize(disc(), ALL[name](), evaluations=EVALUATIONS[name], seed=1)
     assert result.feasible
     assert -np.sqrt(2.0) - 1e-12 <= result.objective < -np.sqrt(2.0) + ENDS[name][2]

@@ -14,7 +14,6 @@ from metaheuristics import (
     ALGORITHMS,
     AntColony,
     AntColonyGrid,
-    EpsilonLevel,
     Flip,
     GeneticAlgorithm,
     ParticleSwarm,
@@ -118,7 +117,6 @@ def test_cma_restarts_with_a_growing_population() -> None:
         (CmaEs, {"growth": 0.5}, "CmaEs: growth must be a finite number >= 1.0, got 0.5"),
         (partial(Pymoo, algorithm="GA"), {"population": 1}, "population"),
         (StaticPenalty, {"weight": 0.0}, r"StaticPenalty: weight must be a finite number > 0\.0, got 0\.0"),
-        (EpsilonLevel, {"share": 1.5}, "share must be .* >= 0.0 and <= 1.0, got 1.5"),
     ],
 )
 def test_bad_settings(factory: Callable[..., object], settings: dict[str, object], message: str) -> None:

@@ -42,7 +42,7 @@ def test_more_runs_solvers_and_problems_continue_what_is_there(tmp_path: Path) -
 CHANGES: dict[str, dict[str, Any]] = {
     "budget": {"evaluations": 300},
     "seed": {"seed": 7},
-    "handling": {"handling": "epsilon"},
+    "handling": {"handling": "penalty=2"},
     "settings": {"solvers": [("pso", ParticleSwarm(population=20))]},
     "parameter": {"problems": [ProblemSpec(name="walk12", values={"lambda": 0.5})]},
     "option": {"problems": [ProblemSpec(name="walk12", options={"intervals": 10})]},
