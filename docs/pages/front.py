@@ -16,7 +16,7 @@ from docs.pages.playground import FOLDER, write_playground
 from docs.pages.problems import GAITS, names
 from nlp_gait.formulation import load
 
-STUDY = ("nao-ssp", "--algorithms", "pso,ga,aco,cma", "--runs", "5", "--starts", "5")
+STUDY = ("nao-ssp", "--algorithms", "pso,ga,aco,cma", "--runs", "5", "--starts", "5", "--evaluations", "5000")
 REPORT = "report.html"  # at the root of the site
 
 
