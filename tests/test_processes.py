@@ -11,7 +11,6 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,7 +19,7 @@ from nlp_gait import processes
 from nlp_gait.errors import InputError, NoWorkersError, WorkerError
 from nlp_gait.interrupts import never
 from nlp_gait.processes import Job, run_alone, run_in_forks, run_jobs
-from tests.faults.processes import ROOT, wait_for
+from tests.faults.processes import ROOT, is_alive, wait_for
 
 METHODS = [method for method in ("fork", "spawn") if method in multiprocessing.get_all_start_methods()]
 needs_fork = pytest.mark.skipif("fork" not in METHODS, reason="processes cannot be copied here")
@@ -175,13 +174,6 @@ def test_memory_of_what_runs_alone_is_limited() -> None:
     with pytest.raises(MemoryError):
         run_alone(lambda _: len(bytearray(2**30)), memory_bytes=2**28)
     assert run_alone(lambda _: len(bytearray(2**20)), memory_bytes=2**28) == 2**20
-
-
-def is_alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 PARENT = """

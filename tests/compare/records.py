@@ -79,19 +79,6 @@ def record(
     )
 
 
-# A feasible point of nao-dsp, like those with up to 0.6 s.
-FAST_X = {
-    "hip_height_m": 0.31,
-    "hip_vz_start_m_s": 0.05,
-    "hip_vz_end_m_s": -0.042764743,
-    "hip_vx_start_m_s": 0.155932802,
-    "hip_vx_end_m_s": 0.088565687,
-    "hip_vy_start_m_s": -0.17373649,
-    "hip_vy_end_m_s": -0.177785607,
-    "double_support_time_s": 0.52,
-}
-
-
 def judged(
     solver: str,
     x: Mapping[str, float],

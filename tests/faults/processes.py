@@ -35,6 +35,14 @@ def wait_for(condition: Callable[[], bool], seconds: float = 60.0) -> None:
         time.sleep(0.01)
 
 
+def is_alive(pid: int) -> bool:
+    """Return whether a process runs, by /proc."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
 def in_own_mounts(script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run a shell script that may mount private file systems; the test is skipped where that is not allowed."""
     unshare = shutil.which("unshare")

@@ -1,4 +1,4 @@
-"""Ctrl-C in every long command: one sentence, exit status 130, and what was found until then is kept and named."""
+"""Ctrl-C in every long command: one sentence, exit status 130, what was found until then is kept and named; and its handlers."""
 
 import itertools
 import json
@@ -23,7 +23,13 @@ from compare.papers.paper_runs import Effort, Runner
 from compare.questions import sweep
 from compare.study.record import read_record
 from nlp_gait.backends.solvers.solver import IterationWatch
-from nlp_gait.interrupts import Interrupted
+from nlp_gait.interrupts import (
+    Interrupted,
+    defer_interrupts,
+    delay_interrupts,
+    exit_on_interrupt,
+    raise_interrupts,
+)
 from tests.faults.processes import ROOT, start, wait_for
 
 SWEEP = "sweep walk12 --over step_length_m=0.05:0.12:30 --starts 1"
@@ -186,3 +192,49 @@ def test_within_exec_the_status_is_the_same(tmp_path: Path) -> None:
     path = os.pathsep.join([str(tmp_path), str(ROOT)])
     done = subprocess.run([sys.executable, "-m", "pressed"], env={**os.environ, "PYTHONPATH": path}, timeout=60)
     assert done.returncode == 130
+
+
+def test_a_second_press_is_not_deferred() -> None:
+    with pytest.raises(KeyboardInterrupt), defer_interrupts() as pressed:
+        signal.raise_signal(signal.SIGINT)
+        assert pressed()
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_a_press_while_the_handler_is_restored_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    restore = signal.signal
+
+    def press(number: int, handler: object) -> object:
+        signal.raise_signal(signal.SIGINT)
+        return restore(number, handler)  # type: ignore[arg-type]
+
+    with pytest.raises(KeyboardInterrupt), delay_interrupts():
+        monkeypatch.setattr(signal, "signal", press)
+
+
+def test_an_ignored_interrupt_stays_ignored() -> None:
+    """As under nohup, and for what a shell runs in the background."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with defer_interrupts() as pressed:
+            signal.raise_signal(signal.SIGINT)
+            assert not pressed()
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_ends_the_process_outside_of_a_command_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[object] = []
+    monkeypatch.setattr(os, "_exit", ended.append)
+    monkeypatch.setattr(os, "write", lambda *what: ended.append(what))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        exit_on_interrupt()
+        with pytest.raises(KeyboardInterrupt), raise_interrupts():
+            signal.raise_signal(signal.SIGINT)
+        assert ended == []
+        signal.raise_signal(signal.SIGINT)
+        assert ended == [(2, b"nlp-gait: interrupted\n"), 130]
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -190,10 +190,16 @@ def test_a_function_that_hangs_ends_at_the_time_limit_with_its_best_point() -> N
         minimize(Disk(), algorithm, evaluations=100, time_limit_s=0.2)
 
 
-def test_an_error_of_the_function_is_its_own() -> None:
-    def failing(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
-        f(np.zeros(2))
-        raise ZeroDivisionError("mine")
-
-    with pytest.raises(ZeroDivisionError, match="mine"):
-        minimize(Disk(), to_algorithm(failing, "failing"), evaluations=100)
+@pytest.mark.parametrize(
+    ("search", "error", "message"),
+    [
+        (lambda f, lower, upper, evaluations, seed: 1 / f(0 * lower), ZeroDivisionError, "division by zero"),
+        (lambda f, lower, upper, evaluations, seed: lower, SearchError, "f was never called: the function returned"),
+        (lambda f, lower, upper, evaluations, seed: f(lower[:1]), SearchError, r"f takes one point of shape \(2,\)"),
+    ],
+)
+def test_an_error_of_the_function_is_its_own_and_wrong_calls_are_named(
+    search: Any, error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        minimize(Disk(), to_algorithm(search, "own"), evaluations=100)

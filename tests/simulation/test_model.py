@@ -1,15 +1,19 @@
-"""The generated model: masses, limits, shapes."""
+"""The generated model: masses, limits, shapes; and what is too large to be simulated."""
 
 import numpy as np
 import pytest
 
-from nlp_gait.formulation import Signals
+from nlp_gait import load
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Result, Signals
+from nlp_gait.formulation.registry import LARGEST_COUNT
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import weld
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import make_plan_model
-from nlp_gait.simulation.plan import Plan
+from nlp_gait.simulation.plan import LONGEST_S as LONGEST_PLAYED_S
+from nlp_gait.simulation.plan import MOST_STEPS, Plan, make_plan
 from nlp_gait.simulation.shapes import Prism, make_shapes
 
 HEAD_JOINTS = ("HeadYaw", "HeadPitch")
@@ -52,3 +56,22 @@ def test_the_engine_reads_our_masses_to_the_last_digit():
 def _tensor(link):
     ixx, iyy, izz, ixy, ixz, iyz = link.inertia_com_kgm2
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+
+
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle"])
+def test_a_grid_is_as_large_as_its_samples(name: str) -> None:
+    with pytest.raises(InputError, match=f"at most {LARGEST_COUNT} intervals in all, got intervals "):
+        load(name, intervals=LARGEST_COUNT // 10, samples_per_interval=12)
+    with pytest.raises(InputError, match="samples_per_interval"):
+        load(name, samples_per_interval=LARGEST_COUNT)  # with the intervals that it has by itself
+
+
+def test_the_length_of_a_simulated_walk_is_limited() -> None:
+    walk = load("nao-cycle", intervals=2)
+    result, longest = Result(problem=walk, x=walk.upper), f"at most {LONGEST_PLAYED_S:g} s are simulated"
+    for steps, words in (
+        (60, rf"60 steps of this gait last 360 s, and {longest}"),
+        (10**9, f"at most {MOST_STEPS} steps"),
+    ):
+        with pytest.raises(InputError, match=words):
+            make_plan(result, steps)

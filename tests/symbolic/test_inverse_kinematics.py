@@ -18,8 +18,6 @@ from nlp_gait.symbolic.trajectories import Motion
 THIGH, TIBIA, MARGIN = 0.1, 0.1029, 0.01
 # Positions of 0.2 m through sines and an arc cosine whose slope is at most 1 / sqrt(2 * MARGIN) here.
 POSITION_TOLERANCE_M = 1e-12
-# Central differences with a step of 1e-5 s on motions of order one: truncation 1e-9, rounding 1e-10.
-DIFFERENCE_STEP_S, DIFFERENCE_TOLERANCE = 1e-5, 1e-6
 
 
 def ik(ops: Nonsmooth) -> ca.Function:
@@ -67,26 +65,6 @@ def test_forward_kinematics_after_inverse_kinematics_is_the_identity(
         np.testing.assert_allclose(np.array(rotation), np.eye(3), rtol=0, atol=1e-12)  # the sole is flat
         assert reach == pytest.approx(np.cos(knee), abs=1e-12)
         assert q[2] == pytest.approx(knee, abs=1e-12)  # the knee bends forward
-
-
-@pytest.mark.parametrize("function", [EXACT, LIFTED], ids=["exact", "lifted"])
-@pytest.mark.parametrize("seed", range(5))
-def test_velocities_and_accelerations_by_central_differences(function: ca.Function, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    c = np.vstack([[0.02, 0.03, -0.16], rng.uniform(-0.05, 0.05, (3, 3))])  # ankle = c0 + c1 t + c2 t^2 + c3 t^3
-
-    def motion(t: float) -> tuple[Array, Array, Array]:
-        return (
-            c[0] + c[1] * t + c[2] * t**2 + c[3] * t**3,
-            c[1] + 2 * c[2] * t + 3 * c[3] * t**2,
-            2 * c[2] + 6 * c[3] * t,
-        )
-
-    for t in (-0.2, 0.0, 0.15):
-        before, now, after = (angles(function, *motion(t + shift * DIFFERENCE_STEP_S)) for shift in (-1, 0, 1))
-        for order in (0, 1):
-            slope = (after[order] - before[order]) / (2 * DIFFERENCE_STEP_S)
-            np.testing.assert_allclose(now[order + 1], slope, rtol=0, atol=DIFFERENCE_TOLERANCE)
 
 
 wild = st.tuples(*[st.floats(-1e6, 1e6)] * 3)

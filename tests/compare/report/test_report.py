@@ -17,7 +17,7 @@ from compare.report.study_report import make_study_document, renew_report
 from compare.study.study import StudyFile, name_record, write_record
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Objective
-from tests.compare.records import FAST_X, judged, record, study
+from tests.compare.records import DSP_X, judged, record, study
 
 FILE = StudyFile(command="nlp-gait compare <b>walk</b>", date="2026-01-01 00:00:00 UTC")
 
@@ -159,8 +159,8 @@ def test_the_page_shows_command_and_machine_and_loads_nothing(page: str, tables:
 
 
 def test_a_damaged_record_is_named_and_left_out(tmp_path: Path, coarse_pictures: None) -> None:
-    write_record(judged("pso", FAST_X), tmp_path)
-    write_record(judged("pso", FAST_X, run=1), tmp_path).write_text("{")
+    write_record(judged("pso", DSP_X), tmp_path)
+    write_record(judged("pso", DSP_X, run=1), tmp_path).write_text("{")
     records, damaged, _ = renew_report(tmp_path, FurtherFiles(csv=True))
     assert [record.run for record in records] == [0] and "is not valid JSON" in damaged[0]
     assert (tmp_path / "runs.csv").read_text().count("pso") == 1

@@ -8,11 +8,9 @@ import pytest
 
 from compare.study.run import ProblemSpec, Run, plan_runs
 from compare.study.study import Study, read_records, run_study
-from tests.compare.records import run_once
 
 WALK = ProblemSpec(name="walk12")
 STOP: dict[str, Any] = {"evaluations": 200, "time_limit_s": 0.5}
-PATIENT: dict[str, Any] = {"evaluations": 200, "time_limit_s": 60.0}  # on a busy machine a process may begin late
 
 ALGORITHM = """
 import os, sys, time
@@ -69,7 +67,6 @@ WAYS: dict[str, tuple[str, str, str | None]] = {
     ),
     "leaves a child": ("start", "os.fork() or time.sleep(10**6)", None),
 }
-ALL = "f, lower, upper, evaluations, seed"  # what a plain function takes
 
 
 def written(folder: Path, name: str, way: str) -> Path:
@@ -103,28 +100,3 @@ def test_many_hostile_plug_ins_leave_the_others_records_whole(
             if said is None
             else re.search(said, record.status)
         ), (ways[record.solver], record.status)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "body", "said"),
-    [
-        (
-            ALL,
-            "import time\n while True:\n  try: f(lower), time.sleep(0.01)\n  except BaseException: pass",
-            "time limit reached",
-        ),
-        (ALL, "for _ in range(9999):\n  try: f(lower)\n  except BaseException: pass", "evaluation budget used"),
-        (ALL, "return lower", "f was never called: the function returned"),
-        (ALL, "f(lower[:2])", r"f takes one point of shape \(4,\)"),
-        ("f, lower", "f(lower)", r"a plain function takes \(f, lower, upper, evaluations, seed\)"),
-    ],
-)
-def test_a_plain_function_is_stopped_at_its_budget_even_if_it_ignores_it(
-    arguments: str, body: str, said: str, tmp_path: Path
-) -> None:
-    (tmp_path / "own.py").write_text(f"def search({arguments}):\n {body}\n")
-    stop = STOP if "time limit" in said else PATIENT
-    record = run_once(Run(problem=WALK, solver=f"{tmp_path / 'own.py'}:search", **stop))
-    assert re.search(said, record.status)
-    is_kept = said in ("evaluation budget used", "time limit reached")
-    assert record.reported_feasible == is_kept and (said != "evaluation budget used" or record.counts["f"] == 200)

@@ -1,4 +1,4 @@
-"""Studies: the same files whatever the workers, resumed after kill -9, everything wrong said before the work."""
+"""Studies: the same files whatever the workers, resumed after kill -9, all wrong said before the work; gradient methods."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from compare.study.study import Study, read_records, read_study_file, run_study,
 from metaheuristics import ParticleSwarm, SearchError
 from metaheuristics.interface import Array, Start
 from nlp_gait.errors import GaitError, InputError
+from tests.compare.records import run_once
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "bring_your_own.py"
 SSP = ProblemSpec(name="nao-ssp")
@@ -167,3 +168,21 @@ def test_two_solvers_of_one_name_are_refused() -> None:
     task = Run(problem=SSP, solver="pso")
     with pytest.raises(InputError, match="give them different labels"):
         Study(runs=(task, replace(task, settings={"population": 20})))
+
+
+OPTIMUM = 0.845868
+
+
+def test_slsqp_finds_the_optimum_and_counts_every_finite_difference() -> None:
+    record = run_once(Run(problem=SSP, solver="slsqp"))
+    assert record.reported_feasible and record.feasible
+    assert record.objective == pytest.approx(OPTIMUM, rel=1e-4)
+    assert record.counts["f"] == record.history.evaluations[-1] > 10 * record.iterations
+    assert (np.diff(record.history.evaluations) > 0).all() and (np.diff(record.time_s.history) > 0.0).all()
+
+
+def test_slsqp_keeps_its_best_point_within_the_budget() -> None:
+    record = run_once(Run(problem=SSP, solver="slsqp", evaluations=45))
+    assert record.status == "evaluation budget used" and not record.reported_feasible
+    assert record.counts["f"] <= 45 and set(record.x) == set(SSP.load().names)
+    assert run_once(Run(problem=SSP, solver="slsqp", time_limit_s=1e-9)).status == "time limit reached"

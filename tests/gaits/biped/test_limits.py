@@ -18,7 +18,6 @@ from nlp_gait.gaits.biped.support_phases import make_support_box
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.robots import load_robot
 from nlp_gait.symbolic.nonsmooth import Exact
-from tests.gaits.biped.lopsided import WIDTHS, make_lopsided
 
 TORQUE = np.array([[0.0, 1.0, 3.0, 6.0, 10.0], [5.0, 4.0, 2.0, 2.0, 1.0]])
 
@@ -87,3 +86,12 @@ def test_a_sole_stands_in_the_middle_of_its_tread() -> None:
         assert ankle - foot.back_m - tread.edge_m == pytest.approx(0.02)
         assert tread.edge_m + run - (ankle + foot.front_m) == pytest.approx(0.02)
         assert tread.height_m == pytest.approx(0.02 * k)
+
+
+WIDTHS = {"left": {"left_m": 0.06, "right_m": 0.02}, "right": {"left_m": 0.03, "right_m": 0.05}}
+
+
+def make_lopsided(body: Body) -> Body:
+    """Return the body with soles that reach farther outward than inward, each by another amount."""
+    feet = {side: replace(foot, **WIDTHS[side]) for side, foot in body.robot.feet.items()}
+    return replace(body, motors=replace(body.motors, robot=replace(body.robot, feet=feet)))
