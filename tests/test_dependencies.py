@@ -55,7 +55,10 @@ TABLES = ("nlp_gait.providers",)  # of problems and limits, which name the place
 ENTRIES = ("nlp_gait", "nlp_gait.__main__", "compare", "compare.__main__")
 PACKAGES = ("nlp_gait", "metaheuristics", "compare")
 PLACE = re.compile(rf"({'|'.join(PACKAGES)})(\.\w+)+(:\w+)?")
-FAMILIES = ("humanoid", "nao", "stairs", "walk12")
+FAMILIES = [f"nlp_gait/gaits/{family}" for family in ("humanoid", "nao", "stairs", "walk12")]
+# What a package must not import: families of problems each other, and searches neither formulas nor gaits.
+APART = {family: [other.replace("/", ".") for other in FAMILIES if other != family] for family in FAMILIES}
+APART |= {"metaheuristics": ["casadi", "nlp_gait", "compare"]}
 
 
 def modules(package: str) -> list[str]:
@@ -148,18 +151,11 @@ def test_files_do_not_import_each_other_in_a_circle() -> None:
     TopologicalSorter({m: targets - packages for m, targets in graph.items() if m not in packages}).prepare()  # raises
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_families_of_problems_do_not_import_each_other(family: str) -> None:
-    others = tuple(f"nlp_gait.gaits.{other}" for other in FAMILIES if other != family)
-    for module in modules(f"nlp_gait/gaits/{family}"):
-        bad = [name for name in (*imports(module), *named_modules(module)) if within(name, *others)]
+@pytest.mark.parametrize("package", APART)
+def test_families_of_problems_and_searches_stand_alone(package: str) -> None:
+    for module in modules(package):
+        bad = [name for name in (*imports(module), *named_modules(module)) if within(name, *APART[package])]
         assert not bad, f"{module} imports {bad}"
-
-
-@pytest.mark.parametrize("module", modules("metaheuristics"))
-def test_searches_import_neither_casadi_nor_gaits(module: str) -> None:
-    bad = [name for name in imports(module) if within(name, "casadi", "nlp_gait", "compare")]
-    assert not bad, f"{module} imports {bad}"
 
 
 @pytest.mark.parametrize(

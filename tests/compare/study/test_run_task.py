@@ -1,16 +1,15 @@
 """User-defined algorithms that fail in every way: each has a record of its failure, and the others' records are complete."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from compare.study.run import ProblemSpec, Run, plan_runs
+from compare.study.run import ProblemSpec, Run
 from compare.study.study import Study, read_records, run_study
 
-WALK = ProblemSpec(name="walk12")
-STOP: dict[str, Any] = {"evaluations": 200, "time_limit_s": 0.5}
+PSO = Run(problem=ProblemSpec(name="walk12"), solver="pso", evaluations=200)
 
 ALGORITHM = """
 import os, sys, time
@@ -77,24 +76,27 @@ def written(folder: Path, name: str, way: str) -> Path:
     return path
 
 
+@pytest.mark.commit
 def test_many_hostile_plug_ins_leave_the_others_records_whole(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    alone = run_study(Study(runs=(Run(problem=WALK, solver="pso", **STOP),)))
-    solvers, ways = [("", "pso")], {}
-    for k, way in enumerate(WAYS):
-        ways[f"h{k}"] = way
-        solvers.append((f"h{k}", f"{written(tmp_path, f'h{k}', way)}:Algorithm"))
-    runs = plan_runs([WALK], solvers, runs=1, starts=1, **STOP)
+    (alone,) = run_study(Study(runs=(PSO,)))
+    ways = {f"h{k}": way for k, way in enumerate(WAYS)}
+    hostile = [
+        replace(PSO, solver=f"{written(tmp_path, label, way)}:Algorithm", label=label, time_limit_s=limit)
+        for label, way in ways.items()
+        for limit in [0.5 if way == "never returns at import" else 60.0]  # on a busy machine a process may begin late
+    ]
+    runs = (PSO, *hostile)
     records = run_study(Study(runs=runs, folder=tmp_path / "out"))
     assert capfd.readouterr().out == ""
-    assert len(read_records(tmp_path / "out")[0]) == len(solvers)  # every file is read strictly
+    assert len(read_records(tmp_path / "out")[0]) == len(runs)  # every file is read strictly
     (pso,) = [record for record in records if record.solver == "pso"]
-    assert (pso.x, pso.objective, pso.history) == (alone[0].x, alone[0].objective, alone[0].history)
+    assert (pso.x, pso.objective, pso.history) == (alone.x, alone.objective, alone.history)
     for record in (record for record in records if record.solver in ways):
         said = WAYS[ways[record.solver]][2]
         assert record.reported_feasible == (said is None), (ways[record.solver], record.status)
-        assert record.reported_feasible or (not record.feasible and record.time_s.solve == 0.0)
+        assert record.reported_feasible or not record.feasible
         assert (
             re.match("evaluation budget used|time limit reached", record.status)
             if said is None

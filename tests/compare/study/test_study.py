@@ -10,9 +10,9 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +21,6 @@ from compare.study.record import SCHEMA, read_record
 from compare.study.run import ProblemSpec, Run, plan_runs
 from compare.study.study import Study, read_records, read_study_file, run_study, write_record
 from metaheuristics import ParticleSwarm, SearchError
-from metaheuristics.interface import Array, Start
 from nlp_gait.errors import GaitError, InputError
 from tests.compare.records import run_once
 
@@ -95,46 +94,6 @@ def test_killed_at_a_random_moment_and_resumed_it_ends_as_undisturbed(undisturbe
     assert all(read_record(path) for path in tmp_path.glob("records/*/*.json"))  # whole or absent
     run_study(Study(runs=SMALL, folder=tmp_path))
     assert contents(tmp_path) == contents(undisturbed)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Broken:
-    """An algorithm that fails: in a worker it raises, or takes the process with it."""
-
-    population: int = 2
-    deadly: bool = False
-    name: ClassVar[str] = "broken"
-
-    def start(self, start: Start) -> Broken:
-        if self.deadly:
-            os.kill(os.getpid(), signal.SIGKILL)
-        raise RuntimeError("no <luck>")
-
-    def ask(self) -> Array:
-        return np.zeros((1, 1))
-
-    def tell(self, *_: object) -> None:
-        """Learn nothing."""
-
-    def stop(self) -> tuple[str, ...]:
-        return ()
-
-
-def test_a_run_that_raises_is_a_record_with_the_reason(tmp_path: Path) -> None:
-    tasks = (Run(problem=SSP, solver=Broken()), Run(problem=SSP, solver="pso", evaluations=100))
-    broken, good = run_study(Study(runs=tasks, folder=tmp_path))
-    assert broken.status == "failed: RuntimeError: no <luck>" and not broken.reported_feasible and not broken.feasible
-    assert good.counts == {"f": 100}
-    again = next(r for r in read_records(tmp_path)[0] if r.solver == "broken")
-    assert again.status == broken.status and np.isnan(again.objective) and again.x == {}
-
-
-def test_a_run_that_takes_its_process_with_it_is_failed_and_the_others_are_complete(tmp_path: Path) -> None:
-    light = ProblemSpec(name="walk12")
-    runs = tuple(Run(problem=light, solver=Broken(deadly=True), label=f"deadly-{k}") for k in range(2))
-    *deadly, good = run_study(Study(runs=(*runs, Run(problem=light, solver="random")), folder=tmp_path, jobs=2))
-    assert all("its process ended without a result, by signal SIGKILL" in record.status for record in deadly)
-    assert good.counts == {"f": 10_000}
 
 
 @pytest.mark.parametrize(
