@@ -9,23 +9,15 @@ from nlp_gait.formulation import Array, GaitProblem
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Evaluation:
-    """What the exact functions say of a point.
+    """What the exact functions say of a point."""
 
-    Attributes:
-        cost: what is minimised.
-        violation: in total.
-        g: (m,) values of the rows, between lower and upper (m,) where they hold.
-        indexes: by name.
-        row_names: (m,).
-    """
-
-    cost: float
-    violation: float
-    g: Array
+    cost: float  #: what is minimised
+    violation: float  #: in total
+    g: Array  #: (m,) values of the rows, between lower and upper (m,) where they hold
     lower: Array
     upper: Array
-    indexes: Mapping[str, float]
-    row_names: tuple[str, ...]
+    indexes: Mapping[str, float]  #: by name
+    row_names: tuple[str, ...]  #: (m,)
 
     @property
     def rows(self) -> dict[str, float]:

@@ -18,21 +18,13 @@ pin = pytest.importorskip("pinocchio")  # needs NumPy 2
 
 
 class Standing(NamedTuple):
-    """What a robot on one foot needs.
+    """What a robot on one foot needs."""
 
-    Attributes:
-        torques: by joint name [Nm].
-        zmp: (2,) in the world [m], from the rate of the momentum about the origin.
-        ground_load: vertical force of the ground [N].
-        com: (3,) [m].
-        torso: (3,) position of the torso [m].
-    """
-
-    torques: dict[str, float]
-    zmp: Array
-    ground_load: float
-    com: Array
-    torso: Array
+    torques: dict[str, float]  #: by joint name [Nm]
+    zmp: Array  #: (2,) in the world [m], from the rate of the momentum about the origin
+    ground_load: float  #: vertical force of the ground [N]
+    com: Array  #: (3,) [m]
+    torso: Array  #: (3,) position of the torso [m]
 
 
 def inertia(link: Link, share: float = 1.0) -> pin.Inertia:

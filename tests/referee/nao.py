@@ -39,27 +39,16 @@ class Reading:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Link:
-    """A link's motion.
+    """A link's motion."""
 
-    Attributes:
-        joint: that carries it; empty for the torso.
-        place: (3, N) series of the joint [m].
-        axis: (3, N) of the joint in the world.
-        force: (3, N) rate of its momentum with the weight that is to be carried, m (a + g) [N].
-        moment: (3, N) rate of its angular momentum about its own centre of mass [Nm].
-        centre: (3, N) centre of mass [m].
-        mass: of the link [kg], or of a share of it.
-        acceleration: (3, N) of the centre of mass [m/s^2].
-    """
-
-    joint: str
-    place: Array
-    axis: Array
-    force: Array
-    moment: Array
-    centre: Array
-    mass: Array | float
-    acceleration: Array
+    joint: str  #: that carries it; empty for the torso
+    place: Array  #: (3, N) series of the joint [m]
+    axis: Array  #: (3, N) of the joint in the world
+    force: Array  #: (3, N) rate of its momentum with the weight that is to be carried, m (a + g) [N]
+    moment: Array  #: (3, N) rate of its angular momentum about its own centre of mass [Nm]
+    centre: Array  #: (3, N) centre of mass [m]
+    mass: Array | float  #: of the link [kg], or of a share of it
+    acceleration: Array  #: (3, N) of the centre of mass [m/s^2]
 
 
 def robot() -> Mapping[str, Any]:

@@ -185,29 +185,20 @@ class Body(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """What joints and ground give.
+    """What joints and ground give."""
 
-    Attributes:
-        torque: by joint, (m, P) [Nm].
-        turned: by joint, angle, rate and acceleration (3, m, P).
-        stance: force of the ground on the stance foot (2, m, P) [N].
-        pressure: its centre ahead of the stance ankle (m, P) [m]; NaN where nothing loads the foot.
-        places: by point, its place (2, m, P) [m].
-    """
-
-    torque: dict[str, Array]
-    turned: dict[str, Array]
-    stance: Array
-    pressure: Array
-    places: dict[str, Array]
+    torque: dict[str, Array]  #: by joint, (m, P) [Nm]
+    turned: dict[str, Array]  #: by joint, angle, rate and acceleration (3, m, P)
+    stance: Array  #: force of the ground on the stance foot (2, m, P) [N]
+    pressure: Array  #: its centre ahead of the stance ankle (m, P) [m]; NaN where nothing loads the foot
 
 
-def loads(q: Mapping[str, Array], rear: Mapping[str, Array] | Callable[[Array], Mapping[str, Array]]) -> Loads:
+def loads(q: Mapping[str, Array], rear: Callable[[Array], Mapping[str, Array]]) -> Loads:
     """What carries a part of the robot gives the rate of its momentum, and of its moment.
 
     Args:
         q: by moving link, angle, rate and acceleration (3, m, P).
-        rear: forces of the ground (2, m, P) by the point of the rear foot, or what says them of the whole ground's force.
+        rear: forces of the ground (2, m, P) by the point of the rear foot, of the whole ground's force.
     """
     still = np.zeros_like(q["HK"])
     moved = {"A'": np.zeros((3, 2, *still.shape[1:]))}  # value, velocity, acceleration
@@ -228,7 +219,7 @@ def loads(q: Mapping[str, Array], rear: Mapping[str, Array] | Callable[[Array], 
         bodies[link] = Body(middle[0], lifted, mass, -turn * mass * length**2 / 12 * acceleration)
     places = {name: place[0] for name, place in moved.items()}
     whole = sum(body.mass * body.lifted for body in bodies.values())
-    behind = rear(whole) if callable(rear) else rear
+    behind = rear(whole)
     stance = whole - sum(behind.values())
 
     def asked(links: tuple[str, ...], about: str) -> Array:
@@ -256,15 +247,18 @@ def loads(q: Mapping[str, Array], rear: Mapping[str, Array] | Callable[[Array], 
         turned[joint] = q[link] - (0.0 if base is None else -q[base] if base == "UH" else q[base])
     carried = stance[1] > 0.01 * sum(mass for _, mass in RODS.values()) * GRAVITY
     pressure = np.where(carried, -asked(tuple(RODS), "A'") / np.where(carried, stance[1], 1.0), np.nan)
-    return Loads(torque, turned, stance, pressure, places)
+    return Loads(torque, turned, stance, pressure)
 
 
 def _loaded(q: Mapping[str, Array], t: Array, x: Mapping[str, Array]) -> dict[str, Array]:
     """Rows of the ground's forces, energy and peaks of a planned step."""
     passed = np.minimum(t / x["t2"], 1.0)
     share = x["share"] * (1.0 - passed**2 * (3.0 - 2.0 * passed))
-    torque, turned, stance, pressure, _ = loads(q, lambda whole: {"T": share * whole})
-    found = ground_rows(stance, pressure, FRICTION, "friction")
+    torque, turned, stance, pressure = loads(q, lambda whole: {"T": share * whole})
+    found = {f"stance_load[z, {i}]": value for i, value in enumerate(stance[1])}
+    found |= {f"stance_zmp[x, {i}]": value for i, value in enumerate(pressure)}
+    for way, sign in (("forward", -1.0), ("backward", 1.0)):  # |F_x| <= mu F_z
+        found |= {f"friction[{way}, {i}]": v for i, v in enumerate(FRICTION * stance[1] + sign * stance[0])}
     power = sum(np.abs(torque[joint] * turned[joint][1]) for joint in torque)
     gaps = np.diff(t, axis=0)
     found["energy_J"] = np.sum(gaps * (power[1:] + power[:-1]) / 2, axis=0)  # phases meet without a gap
@@ -274,21 +268,6 @@ def _loaded(q: Mapping[str, Array], t: Array, x: Mapping[str, Array]) -> dict[st
     found["peak_acceleration_rad_s2"] = np.max([np.abs(turned[j][2]).max(axis=0) for j in turned], axis=0)
     found["peak_torque_Nm"] = np.max([np.abs(torque[j]).max(axis=0) for j in torque], axis=0)
     found["zmp_margin_min_m"] = np.minimum(pressure, FOOT - pressure).min(axis=0)
-    return found
-
-
-def ground_rows(stance: Array, pressure: Array, friction: float, name: str) -> dict[str, Array]:
-    """Load, grip and centre of pressure of the stance foot, by name."""
-    found = {f"stance_load[z, {i}]": value for i, value in enumerate(stance[1])}
-    found |= {f"stance_zmp[x, {i}]": value for i, value in enumerate(pressure)}
-    return found | grip_rows(stance, friction, name)
-
-
-def grip_rows(force: Array, friction: float, name: str) -> dict[str, Array]:
-    """|F_x| <= mu F_z as two rows."""
-    found = {}
-    for way, sign in (("forward", -1.0), ("backward", 1.0)):
-        found |= {f"{name}[{way}, {i}]": v for i, v in enumerate(friction * force[1] + sign * force[0])}
     return found
 
 

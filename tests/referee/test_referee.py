@@ -13,7 +13,7 @@ import pytest
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
-from tests.referee import nao, stairs, stairs_climb, walk12
+from tests.referee import nao, stairs, walk12
 
 POINTS = 250
 AGREEMENT = 1e-9  # of a row's scale, or of its value where that is larger
@@ -136,19 +136,6 @@ def test_the_planned_step_on_stairs(length: float, ratio: float, agreement: floa
     found = compared(problem, referee, drawn(problem, referee, 900, in_order))
     assert len(found) == 44 * 22 + 3 * 82 + 4 + 5
     assert worst(found)[0] < agreement, worst(found)
-
-
-def test_the_regular_step_of_a_climb() -> None:
-    """Effort of one more stair, and all rows of 1,560 variables: continuity, feet, shanks, and the ground's forces."""
-    problem, longer = (nlp_gait.load("stairs-climb", stairs=stairs, intervals=70) for stairs in (2, 3))
-    X = np.random.default_rng(21).uniform(problem.lower, problem.upper, (POINTS, len(problem.names)))
-    slow = ("rate", "acceleration", "toe", "sole")
-    X[:, [name.partition("_")[2].startswith(slow) for name in problem.names]] *= 0.1  # else it flies as a rule
-    found = compared(problem, lambda X: stairs_climb.regular_step(X, problem.names), X, "next_")
-    assert len(found) == 2 * 490 + 6 + 69 + 56 + 10 + 4 + 4 + 4 + 56 + 126 + 56 + 20 + 140 + 70 + 70 + 142 + 213 + 10
-    assert worst(found)[0] < AGREEMENT, worst(found)
-    two, three = (np.array(build_exact_model(p).function(X.T, p.p)[0])[0] for p in (problem, longer))
-    np.testing.assert_allclose(three - two, stairs_climb.regular_step(X, problem.names)["effort"], rtol=AGREEMENT)
 
 
 def test_reach_is_judged_alike_out_of_reach() -> None:
