@@ -121,9 +121,11 @@ def plan(name: str, folder: Path, row: Row) -> Row:
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
         "energy_J_per_m": walk.energy_J / walk.distance_m,
-        "speed_m_s": float(indexes["speed_m_s"]),
+        "speed_m_s": float(indexes["speed_m_s"]) if "speed_m_s" in indexes else None,  # None if the steps differ
         "distance_m": walk.distance_m,
-        "margins_m": [float(indexes[f"ssp_dbm_{axis}_min_m"]) for axis in "xy"],
+        "margins_m": [
+            min(float(value) for name, value in indexes.items() if name.endswith(f"ssp_dbm_{axis}_min_m")) for axis in "xy"
+        ],
         "active_margins": list(walk.active_margins),
         "planning_s": perf_counter() - begin,
     }
@@ -226,7 +228,7 @@ def tabulate_walks(folders: list[Path]) -> Iterator[str]:
             f"`{row['name']}`",
             f"{plan['mass_kg']:.1f}",
             f"{plan['energy_J_per_m']:.3g}",
-            f"{plan['speed_m_s']:.2f}",
+            "of each step" if plan["speed_m_s"] is None else f"{plan['speed_m_s']:.2f}",
             ", ".join(f"{1e3 * margin:.0f}" for margin in plan["margins_m"]),
             *(describe_walk(row, feedback) for feedback in FEEDBACKS),
             *(describe_pushes(row, feedback) for feedback in FEEDBACKS),
