@@ -124,7 +124,8 @@ def plan(name: str, folder: Path, row: Row) -> Row:
         "speed_m_s": float(indexes["speed_m_s"]) if "speed_m_s" in indexes else None,  # None if the steps differ
         "distance_m": walk.distance_m,
         "margins_m": [
-            min(float(value) for name, value in indexes.items() if name.endswith(f"ssp_dbm_{axis}_min_m")) for axis in "xy"
+            min(float(value) for name, value in indexes.items() if name.endswith(f"ssp_dbm_{axis}_min_m"))
+            for axis in "xy"
         ],
         "active_margins": list(walk.active_margins),
         "planning_s": perf_counter() - begin,

@@ -20,7 +20,7 @@ from nlp_gait.files import check_path, convert_errors
 from nlp_gait.robots.inference import EXTENTS, SIDES, Feet, Legs, Side, check_sizes, find_legs, find_middle, infer_feet
 from nlp_gait.robots.packages import MARK, MODEL_ENDINGS, find_kind, find_robot_file
 from nlp_gait.robots.perturbation import perturb, split_name
-from nlp_gait.robots.robot import Foot, Joint, Link, Robot, check_robot_name, make_unit_axis
+from nlp_gait.robots.robot import ANY_ANGLE, Foot, Joint, Link, Robot, check_robot_name, make_unit_axis
 from nlp_gait.robots.tree import check_inertias, move_along_axis, move_root, shift_to_com
 from nlp_gait.robots.welding import Joints, Links, RobotParts, find_faults, weld_faults
 
@@ -302,8 +302,12 @@ def _complete(
 def _note_limits(joints: Joints, legs: Legs, notes: list[str]) -> None:
     """Note which joints of the legs have no limit, or a tighter one of software."""
     moving = [joint for joint in joints.values() if joint.child in legs.links]
-    for quantity, limit in (("torque", "torque_limit_Nm"), ("speed", "velocity_limit_rad_s")):
-        if free := [joint.name for joint in moving if getattr(joint, limit) == math.inf]:
+    for quantity, limit, none in (
+        ("angle", "limits_rad", ANY_ANGLE),
+        ("torque", "torque_limit_Nm", math.inf),
+        ("speed", "velocity_limit_rad_s", math.inf),
+    ):
+        if free := [joint.name for joint in moving if getattr(joint, limit) == none]:
             listed = "all joints of the legs" if len(free) == len(moving) else ", ".join(free)
             notes.append(f"no limit of {quantity}: {listed}")
     if soft := [joint.name for joint in moving if joint.planning_limits_rad != joint.limits_rad]:

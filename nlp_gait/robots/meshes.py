@@ -5,7 +5,6 @@ Nothing but corners is read, and hostile files are refused; libraries for meshes
 
 import math
 import os
-import re
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
@@ -30,22 +29,25 @@ RIM = 24  # points of a cylinder's edge
 
 
 def find_mesh(address: str, robot_file: Path) -> Path | None:
-    """Find the file of a mesh; ``package://`` and ``model://`` are searched for above the robot's file and in ROS's folders."""
+    """Find the file of a mesh: one of a package or model above the robot's file or in ROS's folders, another one beside it.
+
+    The name of a package need not be that of its folder; paths are often relative to the folder above.
+    """
     if "\0" in address:
         return None
+    above = robot_file.absolute().parents
     if not address.startswith(PACKAGES):
-        file = robot_file.parent / address.removeprefix("file://")
-        return file if os.path.isfile(file) else None
+        path = Path(address.removeprefix("file://"))
+        return next((file for folder in above[:2] if os.path.isfile(file := folder / path)), None)
     path = Path(address.partition("://")[2].lstrip("/"))
     if ".." in path.parts or not path.parts:
         return None
     listed = [
         Path(folder) for name in FOLDER_VARIABLES for folder in os.environ.get(name, "").split(os.pathsep) if folder
     ]
-    above = [*robot_file.absolute().parents, *listed, *(folder / "share" for folder in listed)]
-    named = re.compile(rf"{re.escape(path.parts[0])}(-.*)?")  # GitHub's ZIP files append the branch: -main
-    inside = [folder for folder in above if named.fullmatch(folder.name)]
-    candidates = [*(folder / path for folder in above), *(folder.joinpath(*path.parts[1:]) for folder in inside)]
+    inside = Path(*path.parts[1:])
+    candidates = [folder / path for folder in (*above, *listed, *(folder / "share" for folder in listed))]
+    candidates += [folder / inside for folder in (*above, *listed)]
     return next((file for file in candidates if os.path.isfile(file)), None)
 
 

@@ -24,7 +24,7 @@ from nlp_gait.robots.meshes import (
     move_points,
     read_model,
 )
-from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
+from nlp_gait.robots.robot import ANY_ANGLE, LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
@@ -84,7 +84,7 @@ def _read_turning(model: Any, hinge: int, parent: str, child: str, axis: Array) 
         child=child,
         origin_m=(0.0, 0.0, 0.0),  # ``join_frames`` places it
         axis=make_unit_axis(to_vector(axis)),
-        limits_rad=(float(low), float(high)) if model.jnt_limited[hinge] else (-math.pi, math.pi),
+        limits_rad=(float(low), float(high)) if model.jnt_limited[hinge] else ANY_ANGLE,
         velocity_limit_rad_s=math.inf,  # MJCF has none
         torque_limit_Nm=_find_torque_limit(model, hinge),
         armature_kgm2=float(model.dof_armature[rate]),

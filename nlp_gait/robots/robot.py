@@ -133,6 +133,7 @@ class Motor:
         return self.no_load_rad_s / self.stall_torque_Nm
 
 
+ANY_ANGLE = (-math.pi, math.pi)  # limits of a joint whose file states none [rad]
 POSITIVE_LIMITS = ("velocity_limit_rad_s", "torque_limit_Nm", "nominal_torque_Nm")  # of a joint
 
 

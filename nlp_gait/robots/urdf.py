@@ -21,7 +21,7 @@ from nlp_gait.robots.meshes import (
     read_model,
     remove_namespace,
 )
-from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis, rank_joints
+from nlp_gait.robots.robot import ANY_ANGLE, LARGEST_NUMBER, Joint, are_plausible, make_unit_axis, rank_joints
 from nlp_gait.robots.tree import Array, Mass, compute_point_inertia, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
@@ -74,7 +74,11 @@ def read_urdf(path: str, *, about_joint: bool = False) -> RobotParts:
         parent, turns = (joint_to[link].parent, joint_to[link].kind in TURNING) if link in joint_to else (None, False)
         frames[link] = LinkFrame(parent, turns, poses[link][:3, 3], _read_mass(element, poses[link], about_joint))
     notes, turning = _list_ignored(robot), [joint for joint in joints if joint.kind in TURNING]
-    unusable = {joint.child: fault for joint in turning if (fault := _find_unusable(joint))}
+    unusable = {
+        joint.child: f"mimics joint {mimic.get('joint')!r}: coupled joints are not supported; remove <mimic>"
+        for joint in turning
+        if (mimic := _find_part(joint.element, "mimic")) is not None
+    }
     for key in LIMITS:
         zero = [joint for joint in turning if _read_limit(joint, key) == 0.0]
         if zero and len(zero) == len(turning):
@@ -107,15 +111,6 @@ class UrdfJoint(NamedTuple):
     kind: str
     parent: str
     child: str
-
-
-def _find_unusable(joint: UrdfJoint) -> str:
-    """Return why a joint cannot be part of a leg, in words, or ""."""
-    if joint.element.find("mimic") is not None:
-        return f"mimics joint {joint.element.find('mimic').get('joint')!r}: coupled joints are not supported; remove <mimic>"
-    if joint.kind == "revolute" and joint.element.find("limit") is None:
-        return "is revolute and has no <limit>; write one with lower and upper, or make it continuous"
-    return ""
 
 
 def list_meshes(path: str) -> list[str]:
@@ -239,8 +234,8 @@ def _read_mass(link: Any, frame: Array, about_joint: bool) -> Mass:
 
 def _read_turning(joint: UrdfJoint, frame: Array) -> Joint:
     limit, axis = _find_part(joint.element, "limit"), _find_part(joint.element, "axis")
-    low, high = -math.pi, math.pi
-    if joint.kind == "revolute" and limit is not None:
+    low, high = ANY_ANGLE
+    if joint.kind == "revolute" and limit is not None and {"lower", "upper"} & set(limit.attrib):
         low, high = (_read_number(limit, key, "0", finite=False) for key in ("lower", "upper"))
     soft = _find_part(joint.element, "safety_controller")
     planned = [low, high]

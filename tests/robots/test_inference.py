@@ -130,14 +130,15 @@ def test_a_mesh_is_needed_only_where_a_sole_comes_from_it(tmp_path: Path) -> Non
     assert load_robot(override(path, feet=name_feet("ankle_roll"))).feet["right"].back_m == 0.05
 
 
-@pytest.mark.parametrize("folder", ["feet", "feet-main", "feet-1.2"])  # a clone, and archives of GitHub
-def test_a_package_is_known_by_its_folder(tmp_path: Path, folder: str) -> None:
+@pytest.mark.parametrize("folder", ["feet", "feet-main", "models"])  # a clone, an archive of GitHub, another name
+def test_a_mesh_is_found_in_the_folder_of_its_package_and_above_the_file(tmp_path: Path, folder: str) -> None:
     (tmp_path / folder / "urdf").mkdir(parents=True)
     mesh = tmp_path / folder / "sole.stl"
     mesh.write_text("")
     model = tmp_path / folder / "urdf" / "robot.urdf"
-    assert find_mesh("package://feet/sole.stl", model) == mesh
-    assert find_mesh("package://hands/sole.stl", model) is find_mesh("package://fee/sole.stl", model) is None
+    assert find_mesh("package://feet/sole.stl", model) == find_mesh("sole.stl", model) == mesh
+    assert find_mesh("package://feet/toe.stl", model) is find_mesh("package://../sole.stl", model) is None
+    assert find_mesh("sole.stl", model.parent / "more" / "robot.urdf") is None  # two folders above
 
 
 def change(old: str, new: str) -> Callable[[str], str]:

@@ -17,6 +17,7 @@ from nlp_gait.formulation import load
 from nlp_gait.gaits.humanoid.body import list_joints, make_humanoid
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import Biped, make_biped_model
+from nlp_gait.robots.robot import ANY_ANGLE
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.simulation.mjcf import add_bodies
 from nlp_gait.symbolic.dynamics import newton_euler
@@ -208,6 +209,9 @@ def test_no_limit_is_no_limit(tmp_path: Path) -> None:
     free = read(tmp_path, wheel, inside("A_knee", f'<limit lower="-0.1" upper="2.3" {LIMIT}', ""))
     assert free.full.joint("A_knee").torque_limit_Nm == np.inf
     assert free.model.joint("A_knee").torque_limit_Nm == 60.0  # of the other side
+    unranged = read(tmp_path, inside("A_knee", 'lower="-0.1" upper="2.3" ', ""))
+    assert unranged.full.joint("A_knee").limits_rad == ANY_ANGLE and "no limit of angle: A_knee" in unranged.full.notes
+    assert unranged.model.joint("A_knee").planning_limits_rad == (-0.1, 2.3)  # of the other side
     unstated = read(tmp_path, change(LIMIT, 'effort="0" velocity="0"/>'))
     assert "effort of every joint is 0: it is taken as not stated" in unstated.full.notes
     assert "no limit of torque: all joints of the legs" in unstated.full.notes
