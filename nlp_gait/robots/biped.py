@@ -178,19 +178,6 @@ def _tighten(robot: Robot, pairs: Sequence[tuple[str, str]], notes: list[str]) -
     return replace(robot, joints=joints)
 
 
-def _gather(robot: Robot, joint: str) -> Mass:
-    """Return the mass of all links below a joint, from the root."""
-    above = robot.joint(joint)
-    path = robot.path_to_root(above.child)
-    masses, waiting = [], [(above.child, np.sum([each.origin_m for each in path], axis=0))]
-    while waiting:
-        name, place = waiting.pop()
-        masses.append(Mass.of_link(robot.links[name]).move(place))
-        below = [other for other in robot.joints.values() if other.parent == name]
-        waiting += [(other.child, place + other.origin_m) for other in below]
-    return combine_masses(masses)
-
-
 def find_differences(robot: Robot) -> tuple[str, ...]:
     """Return what makes a mirrored step another one: axes, masses, centres, tensors, rotors and soles that differ by over 2 %.
 
@@ -211,7 +198,15 @@ def find_differences(robot: Robot) -> tuple[str, ...]:
         gap, angle = compare_axes(MIRROR * points[0], MIRROR * axes[0], points[1], axes[1])
         if gap > MIRROR_M or math.cos(angle) < MIRROR_COSINE:
             differences.append(f"axes of {where} by {1e3 * gap:.1f} mm and {math.degrees(angle):.1f} degrees")
-        one, opposite = (_gather(robot, name) for name in names)
+        one, opposite = (
+            combine_masses(
+                [
+                    Mass.of_link(robot.links[robot.joint(joint).child]).move(place)
+                    for joint, place in zip(leg.joints[k:], leg.points[k:], strict=True)
+                ]
+            )
+            for leg in legs
+        )
         origins = points[0], MIRROR * points[0]
         tensors = [
             body.tensor_kgm2 + compute_point_inertia(body.mass_kg, body.com_m - origin)

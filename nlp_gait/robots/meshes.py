@@ -23,7 +23,6 @@ POINTER = b"version https://git-lfs"  # first bytes of a file whose content Git 
 FOLDER_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 STL_HEADER, STL_TRIANGLE = 84, 50  # bytes
 DEEPEST_NODE = 32  # of a Collada scene
-MOST_MESHES = 10_000
 MOST_POINTS = 4_000_000
 RIM = 24  # points of a cylinder's edge
 
@@ -49,15 +48,6 @@ def find_mesh(address: str, robot_file: Path) -> Path | None:
     candidates = [folder / path for folder in (*above, *listed, *(folder / "share" for folder in listed))]
     candidates += [folder / inside for folder in (*above, *listed)]
     return next((file for file in candidates if os.path.isfile(file)), None)
-
-
-def read_model(path: str) -> bytes:
-    """Return the content of a robot's XML file; raises RobotDataError for one with too many references to meshes."""
-    data = read_bytes(Path(path), "robot file", error=RobotDataError)
-    count = data.count(b"<mesh")
-    if count > MOST_MESHES:
-        raise RobotDataError(f"robot file {path!r} refers to {count} meshes; at most {MOST_MESHES} are read")
-    return data
 
 
 def parse_xml(data: bytes) -> Any:

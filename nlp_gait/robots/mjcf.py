@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError, WorkerError
+from nlp_gait.files import read_bytes
 from nlp_gait.processes import has_fork, run_alone
 from nlp_gait.robots.meshes import (
     POINTER,
     check_pointer,
     list_shape_points,
     move_points,
-    read_model,
 )
 from nlp_gait.robots.robot import ANY_ANGLE, LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, to_vector
@@ -156,7 +156,7 @@ def _compile(path: str) -> Any:
         raise MissingExtraError(
             f"robot file {path!r}: MJCF files need MuJoCo, which is not installed: pip install 'nlp-gait[sim]'"
         )
-    read_model(path)  # refuses special files
+    read_bytes(Path(path), "robot file", error=RobotDataError)  # refuses special files
     mujoco = import_module("mujoco")  # before the fork, which would import it in vain
     texts, _, data = (_compile_in_child if has_fork() else _compile_binary)(mujoco, path).partition(b"\n")
     warnings, files = json.loads(texts)

@@ -175,7 +175,7 @@ def weld_child(links: dict[str, Link], joints: dict[str, Joint], name: str) -> N
     child = Mass.of_link(links.pop(joint.child)).move(np.array(joint.origin_m))
     links[joint.parent] = combine_masses([Mass.of_link(links[joint.parent]), child]).to_link(joint.parent)
     for joint_below in [j for j in joints.values() if j.parent == joint.child]:
-        origin_m = add_vectors(joint.origin_m, joint_below.origin_m)
+        origin_m = to_vector(np.add(joint.origin_m, joint_below.origin_m))
         joints[joint_below.name] = replace(joint_below, parent=joint.parent, origin_m=origin_m)
 
 
@@ -246,11 +246,6 @@ def make_point_masses(robot: Robot) -> Robot:
     """Return the robot with every link's inertia about its centre of mass set to zero."""
     links = {name: replace(link, inertia_com_kgm2=(0.0,) * 6) for name, link in robot.links.items()}
     return replace(robot, links=links)
-
-
-def add_vectors(a: Vector, b: Vector) -> Vector:
-    """Return the sum of two vectors."""
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 def find_partner(name: str) -> str:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
+from nlp_gait.files import read_bytes
 from nlp_gait.robots.meshes import (
     find_mesh,
     list_shape_points,
@@ -18,7 +19,6 @@ from nlp_gait.robots.meshes import (
     move_points,
     parse_xml,
     read_mesh_points,
-    read_model,
     remove_namespace,
 )
 from nlp_gait.robots.robot import ANY_ANGLE, LARGEST_NUMBER, Joint, are_plausible, make_unit_axis, rank_joints
@@ -165,9 +165,8 @@ def _read_xml(path: str) -> Any:
         raise MissingExtraError(
             f"robot file {path!r}: URDF files need the package lxml, which is not installed: pip install 'nlp-gait[urdf]'"
         )
-    data = read_model(path)
     try:
-        robot = parse_xml(data)
+        robot = parse_xml(read_bytes(Path(path), "robot file", error=RobotDataError))
         remove_namespace(robot)
     except ValueError as error:
         raise RobotDataError(f"robot file {path!r} is not valid XML: {error}") from error

@@ -8,7 +8,7 @@ import numpy as np
 
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Vector
-from nlp_gait.robots.tree import add_vectors
+from nlp_gait.robots.tree import to_vector
 
 SOLE_THICKNESS = 0.015  # [m]; the sole's lower face alone touches the floor
 LIMB_RADIUS = 0.02  # [m]
@@ -26,7 +26,7 @@ class Capsule:
 
     def move(self, by: Vector) -> Self:
         """Return the shape, moved by a vector."""
-        return replace(self, start=add_vectors(self.start, by), end=add_vectors(self.end, by))
+        return replace(self, start=to_vector(np.add(self.start, by)), end=to_vector(np.add(self.end, by)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

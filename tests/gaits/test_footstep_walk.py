@@ -8,7 +8,7 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.plan_walk import list_speeds, plan_route
+from nlp_gait.backends.plan_walk import WalkSettings, list_speeds, plan_route
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.gaits.biped.body import TIMES
@@ -207,3 +207,20 @@ def test_every_inner_step_has_its_speed() -> None:
     assert list_speeds([0.02, 0.04, 0.02], 7)["step3_least_speed_m_s"] == pytest.approx(0.03)
     arrays = make_plan(Result(problem=problem, x=x)).signals.arrays
     assert "feet_yaw" not in arrays and arrays["right_foot"][-1, 0] == pytest.approx(LENGTH_M)
+
+
+@pytest.mark.parametrize(("distance_m", "end"), [(0.001, "lower"), (2.0, "upper")])
+def test_a_walk_starts_from_the_cycle_with_the_nearest_step_within_bounds(
+    monkeypatch: pytest.MonkeyPatch, distance_m: float, end: str
+) -> None:
+    cycles: list[GaitProblem] = []
+
+    def stop(cycle: GaitProblem, **_: object) -> None:
+        cycles.append(cycle)
+        raise InputError("stop")
+
+    monkeypatch.setattr("nlp_gait.backends.plan_walk.solve", stop)
+    with pytest.raises(InputError, match="stop"):
+        plan_route("nao-v5", steps=3, distance_m=distance_m, settings=WalkSettings(intervals=2))
+    nearest = nlp_gait.load("nao-cycle").value(f"step_length_m.{end}")
+    assert [cycles[0].value(f"step_length_m.{bound}") for bound in ("lower", "upper")] == [nearest, nearest]
