@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import minimize as minimise_locally
 
 import nlp_gait
-from compare.bench.baseline import list_baselines, load_baseline
+from compare.bench.leaderboard import list_baselines, load_baseline
 from metaheuristics import minimize
 from metaheuristics.registry import make_algorithm
 from nlp_gait import gaitbench

@@ -9,8 +9,7 @@ front's slope at this point; `nlp-gait pareto` adds NSGA-II and CMOPSO.
 import matplotlib.pyplot as plt
 
 import nlp_gait
-from compare.questions.pareto.competing import make_competing_objective
-from compare.questions.pareto.front import solve_front
+from compare.questions.pareto.front import make_competing_objective, solve_front
 
 # %%
 # Five points of the front, each an optimum with another required margin.

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from compare.analysis.comparison import compare_problems
 from compare.analysis.record_statistics import ECDF_TARGETS
-from compare.bench.baseline import (
+from compare.bench.leaderboard import (
     BASELINE,
     DRAWN_RUNS,
     RUNS,

@@ -6,8 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from statistics import median
 
-from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
-from compare.analysis.overview import count_wins, list_user_solvers
+from compare.analysis.comparison import Comparison, SolverRuns, count_wins, index_solvers, list_user_solvers
 from compare.analysis.units import FOUND, compute_gap, format_gap, is_zero, join_words, name_solver, with_unit
 from compare.study.record import RunRecord, find_best
 from compare.study.references import describe_gap, find_reference

@@ -6,8 +6,15 @@ from typing import Annotated, Literal
 
 from typer import Option
 
-from compare.bench.baseline import BASELINE, RUNS, choose_instances, load_table, plan_bench_runs
-from compare.bench.leaderboard import make_leaderboard_page, rank_solvers
+from compare.bench.leaderboard import (
+    BASELINE,
+    RUNS,
+    choose_instances,
+    load_table,
+    make_leaderboard_page,
+    plan_bench_runs,
+    rank_solvers,
+)
 from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
 from compare.cli.options import Evaluations, Jobs, Scheduler, parse_names

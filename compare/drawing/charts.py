@@ -11,8 +11,19 @@ import numpy as np
 
 from compare.analysis.comparison import SMALLEST_GAP, Comparison, SolverRuns, index_solvers
 from compare.analysis.record_statistics import ECDF_TARGETS, compute_band, compute_ecdf
-from compare.drawing.figures import Look, assign_looks, format_power_of_ten
-from compare.drawing.shapes import CIRCLE, LETTER, LINE, Drawing, Label, Stroke, draw_legend, place_drawings
+from compare.drawing.figures import (
+    CIRCLE,
+    LETTER,
+    LINE,
+    Drawing,
+    Label,
+    Look,
+    Stroke,
+    assign_looks,
+    draw_legend,
+    format_power_of_ten,
+    place_drawings,
+)
 from nlp_gait.formulation import Array
 
 if TYPE_CHECKING:

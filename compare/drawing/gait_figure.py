@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.drawing.charts import HEIGHT, WIDTH, Chart, Series, draw_chart
-from compare.drawing.figures import LEGS
-from compare.drawing.shapes import LINE, Drawing, Label, Stroke, draw_legend, place_drawings
+from compare.drawing.figures import LEGS, LINE, Drawing, Label, Stroke, draw_legend, place_drawings
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result, sample_signals
 from nlp_gait.formulation.display import LEFT, RIGHT, Skeleton

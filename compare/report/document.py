@@ -8,8 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from compare.analysis.units import format_number
-from compare.drawing.figures import render_svg
-from compare.drawing.shapes import Drawing, place_drawings
+from compare.drawing.figures import Drawing, place_drawings, render_svg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Plot

@@ -5,8 +5,7 @@ import re
 from collections.abc import Sequence
 from statistics import mean, median, stdev
 
-from compare.analysis.comparison import Comparison
-from compare.analysis.overview import explain_marks, tabulate_problems
+from compare.analysis.comparison import Comparison, explain_marks, tabulate_problems
 from compare.analysis.record_statistics import SIGNIFICANT
 from compare.analysis.units import join_words, make_heading, with_unit
 from nlp_gait.files import make_file_name
@@ -47,7 +46,7 @@ def format_latex_table(comparison: Comparison) -> str:
 
 
 def format_latex_overview(comparisons: Sequence[Comparison]) -> str:
-    """Return the table of problems and solvers, see ``compare.analysis.overview.tabulate_problems``."""
+    """Return the table of problems and solvers, see ``compare.analysis.comparison.tabulate_problems``."""
     subject, rows = tabulate_problems(comparisons)
     header, *body = [[MARK.sub(r" $\1$", escape_latex(cell)) for cell in row] for row in rows]
     return _format_table(escape_latex(explain_marks(subject)), "problems", header, body)

@@ -5,9 +5,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 
 from compare.analysis.columns import EFFORT, EVALUATIONS_TO, JUDGEMENT, MAIN, SECONDS_TO, Column, format_rows
-from compare.analysis.comparison import Comparison
+from compare.analysis.comparison import Comparison, describe_tests, explain_marks, rank_over_problems, tabulate_problems
 from compare.analysis.headline import describe_unknown, write_headline
-from compare.analysis.overview import describe_tests, explain_marks, rank_over_problems, tabulate_problems
 from compare.analysis.units import BY_UNIT, name_in_words, name_solver, with_unit
 from compare.drawing.charts import Chart, draw_chart, make_convergence_charts, make_ecdf_charts, make_final_gap_charts
 from compare.drawing.gait_figure import GaitCurves, draw_gaits, make_gait_charts, prepare_gait

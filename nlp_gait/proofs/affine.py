@@ -136,3 +136,16 @@ def _encode(function: ca.Function, half_open: Collection[int]) -> tuple[Any, Arr
             raise InputError(f"function {function.name()!r}: CasADi's operation number {operation} cannot be enclosed")
         code[k, : 2 + len(places)] = operation, node.register, *places
     return code, np.array([node.constant for node in tape])
+
+
+Numbers = np.ndarray[Any, np.dtype[np.intp]]
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+
+
+class Remaining(NamedTuple):
+    """Boxes in which a feasible point below a target cost may lie."""
+
+    boxes: Array  # (P, n, 2) without the slabs in which there is none
+    lowest: Array  # (P,) lower bound of the cost of the feasible points in the box
+    cut: Numbers  # (P,) variable to cut next
+    origin: Numbers  # (P,) indices of the boxes that were pruned to these

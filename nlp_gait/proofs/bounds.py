@@ -17,11 +17,10 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaits.nao.problems import LeastPower
-from nlp_gait.proofs.affine import AffineForms, AffineFunction
-from nlp_gait.proofs.boxes import Flags, Numbers, Remaining
+from nlp_gait.proofs.affine import AffineForms, AffineFunction, Flags, Numbers, Remaining
 from nlp_gait.proofs.nao.phases import make_power_form
-from nlp_gait.proofs.power_form import AGREEMENT, WIDENING, PowerForm
 from nlp_gait.proofs.quadratic import QuadraticFunction
+from nlp_gait.proofs.quadratic_tape import AGREEMENT, WIDENING, PowerForm
 
 # A box is enclosed again if an edge shrinks by this share, in so many rounds at most.
 LEAST_SHRINKAGE = 0.1

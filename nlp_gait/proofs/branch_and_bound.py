@@ -24,8 +24,8 @@ from nlp_gait.files import read_bytes, replace_file
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.interrupts import Progress, ignore_progress
+from nlp_gait.proofs.affine import Numbers
 from nlp_gait.proofs.bounds import Bounds, make_bounds
-from nlp_gait.proofs.boxes import Numbers
 from nlp_gait.proofs.certificate import PROVER, Certificate
 
 # Number of boxes that are halved together, at least: this, or one in SHARE of the open ones, so that sorting costs little.

@@ -16,10 +16,8 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.proofs.affine import DOUBLE, INT, LONG, POINTER, load_native
-from nlp_gait.proofs.boxes import Flags, Remaining
-from nlp_gait.proofs.power_form import PowerRows
-from nlp_gait.proofs.quadratic_tape import OUTPUT, make_tape
+from nlp_gait.proofs.affine import DOUBLE, INT, LONG, POINTER, Flags, Remaining, load_native
+from nlp_gait.proofs.quadratic_tape import OUTPUT, PowerRows, make_tape
 
 QUADRATIC_SOURCES = ("quadratic.hpp", "convex.hpp", "multipliers.hpp", "relaxation.hpp", "quadratic_calls.hpp")
 MOST_SYMBOLS = 12

@@ -14,8 +14,7 @@ from casadi import MX
 from nlp_gait.formulation import Array, Constraint, GaitProblem, RowsOverTime
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.proofs.affine import AffineForms, AffineFunction
-from nlp_gait.proofs.boxes import Flags, Numbers
+from nlp_gait.proofs.affine import AffineForms, AffineFunction, Flags, Numbers
 from nlp_gait.symbolic.nonsmooth import Exact
 
 # Phases are multiples of this, so that they and their sums are exact; an interval of a phase is rounded to one.

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.gaitbench.baseline import make_rows, write_table
 from compare.analysis.comparison import compare_problems
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
-from compare.bench import baseline
+from compare.bench import leaderboard
 from compare.study.record import RunRecord
 from compare.study.study import Study, run_study
 from nlp_gait.errors import InputError
@@ -20,7 +20,7 @@ ID = "walk12-w015"
 @pytest.fixture(scope="module")
 def runs() -> list[RunRecord]:
     """A few runs of three solvers, the last of which finds nothing."""
-    planned = baseline.plan_bench_runs([ID], dict.fromkeys(("pso", "ipopt", "random"), ""), runs=3, evaluations=1000)
+    planned = leaderboard.plan_bench_runs([ID], dict.fromkeys(("pso", "ipopt", "random"), ""), runs=3, evaluations=1000)
     records = run_study(Study(runs=planned))
     infeasible = [
         replace(r, objective=math.nan, violation=1.0, feasible=False) for r in records if r.solver == "random"
@@ -36,10 +36,10 @@ def test_a_table_gives_the_same_rankings_as_the_records(
     write_table(rows, path)
     first = path.read_bytes()
     write_table(rows, path)
-    assert path.read_bytes() == first and repr(baseline.load_table(path)[ID]) == repr(tuple(rows))
-    monkeypatch.setattr(baseline, "load_table", lambda: {ID: tuple(rows)})
-    again = [baseline.make_record(row) for row in rows]
-    references = {ID: baseline.get_reference(ID)}
+    assert path.read_bytes() == first and repr(leaderboard.load_table(path)[ID]) == repr(tuple(rows))
+    monkeypatch.setattr(leaderboard, "load_table", lambda: {ID: tuple(rows)})
+    again = [leaderboard.make_record(row) for row in rows]
+    references = {ID: leaderboard.get_reference(ID)}
     (before,), (after,) = (compare_problems(records, references=references) for records in (runs, again))
     for old in before.solvers:
         new = next(solver for solver in after.solvers if solver.name == old.name)
@@ -52,4 +52,4 @@ def test_a_table_gives_the_same_rankings_as_the_records(
 
 def test_an_instance_without_a_baseline_is_named() -> None:
     with pytest.raises(InputError, match="no baseline of 'gb2:ssp:0' is shipped"):
-        baseline.load_baseline("gb2:ssp:0")
+        leaderboard.load_baseline("gb2:ssp:0")

@@ -15,8 +15,8 @@ from nlp_gait.errors import InputError
 from nlp_gait.gaits.nao.problems import LeastPower
 from nlp_gait.proofs.affine import AffineForms, AffineFunction
 from nlp_gait.proofs.nao.phases import make_power_form
-from nlp_gait.proofs.power_form import PowerForm, PowerRows
 from nlp_gait.proofs.quadratic import QuadraticForms, QuadraticFunction
+from nlp_gait.proofs.quadratic_tape import PowerForm, PowerRows
 from tests.proofs.soundness import best_x
 
 flint = pytest.importorskip("flint")

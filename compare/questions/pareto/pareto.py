@@ -11,8 +11,14 @@ from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import make_axis_label
 from compare.drawing.figures import COLOURS, make_figure, use_style
-from compare.questions.pareto.competing import CompetingObjective, make_competing_objective
-from compare.questions.pareto.front import FrontPoint, Knee, find_knees, solve_front
+from compare.questions.pareto.front import (
+    CompetingObjective,
+    FrontPoint,
+    Knee,
+    find_knees,
+    make_competing_objective,
+    solve_front,
+)
 from compare.questions.question import Answer, Question, Work, make_record_table, make_table
 from compare.report.document import Figure, Part
 from compare.study.references import find_reference

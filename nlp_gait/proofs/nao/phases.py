@@ -20,7 +20,7 @@ from nlp_gait.gaits.biped.support_phases import place_hip, place_soles, place_st
 from nlp_gait.gaits.nao.body import ARM_SWING, measure_leg
 from nlp_gait.gaits.nao.problems import LeastPower
 from nlp_gait.proofs.nao.instants import PAIRS, PowerInstant, PowerPhase, make_double_support, make_single_support
-from nlp_gait.proofs.power_form import WIDENING, PowerForm, PowerRows
+from nlp_gait.proofs.quadratic_tape import WIDENING, PowerForm, PowerRows
 from nlp_gait.robots import Robot
 
 # Up to this angle its tangent is monotone; slack for angles that break their limits within the judge's tolerance [rad].

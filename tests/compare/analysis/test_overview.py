@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from compare.analysis.comparison import Comparison, compare_problems
+from compare.analysis.comparison import Comparison, compare_problems, count_wins, list_user_solvers, rank_over_problems
 from compare.analysis.headline import write_overall_headline
-from compare.analysis.overview import count_wins, list_user_solvers, rank_over_problems
 from compare.report.document import Table
 from compare.report.study_sections import make_overview
 from tests.compare.records import record

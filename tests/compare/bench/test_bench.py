@@ -6,15 +6,15 @@ from itertools import product
 
 import pytest
 
-from compare.analysis.overview import count_wins
-from compare.bench.baseline import (
+from compare.analysis.comparison import count_wins
+from compare.bench.leaderboard import (
     BASELINE,
     RUNS,
     TABLE,
     list_baselines,
     load_baseline,
+    rank_solvers,
 )
-from compare.bench.leaderboard import rank_solvers
 from nlp_gait import gaitbench
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.bench.baseline import BASELINE
+from compare.bench.leaderboard import BASELINE
 from nlp_gait import gaitbench
 from tests.compare.cli.calls import as_json, nlp_gait
 

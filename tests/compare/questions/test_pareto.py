@@ -5,8 +5,7 @@ import pytest
 
 import nlp_gait
 from compare.judge import evaluate
-from compare.questions.pareto.competing import MARGINS, make_competing_objective
-from compare.questions.pareto.front import FrontPoint, find_knees, solve_front
+from compare.questions.pareto.front import MARGINS, FrontPoint, find_knees, make_competing_objective, solve_front
 from compare.questions.pareto.pareto import Pareto, SearchFront, compute_qualities
 from compare.questions.question import find
 from nlp_gait.errors import InputError, UnknownNameError
