@@ -13,7 +13,8 @@ from docs.pages.markdown import code, page, table, write_all
 from docs.pages.problems import names
 from nlp_gait.backends.nlp import WIDTHS
 from nlp_gait.formulation import load
-from nlp_gait.gaits.stairs.closed_loop import ONLINE, PRINTED, QUANTUM
+from nlp_gait.gaits.stairs.closed_loop import QUANTUM
+from nlp_gait.gaits.stairs.leg_network import ONLINE, PRINTED
 from nlp_gait.robots import load_robot
 from nlp_gait.symbolic.nonsmooth import Exact
 

@@ -15,16 +15,8 @@ from compare.papers.paper import read_rows
 from compare.study.run import ProblemSpec
 from nlp_gait.formulation import Array, Signals
 from nlp_gait.formulation.display import LEFT, RIGHT
-from nlp_gait.gaits.stairs.closed_loop import (
-    LEGS,
-    QUANTUM,
-    ClosedLoop,
-    N,
-    NetworkSettings,
-    compute_leg_vector,
-    make_training_path,
-    measure_joints,
-)
+from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop, N, measure_joints
+from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkSettings, compute_leg_vector, make_training_path
 from nlp_gait.gaits.stairs.planar_biped import GRAVITY, get_rod, load_toe_foot_biped, make_dynamics
 from nlp_gait.gaits.stairs.stair import SETBACK
 from nlp_gait.symbolic.nonsmooth import Exact

@@ -8,7 +8,7 @@ import pytest
 from casadi import SX
 
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.closed_loop import (
+from nlp_gait.gaits.stairs.leg_network import (
     ONLINE,
     PRINTED,
     NetworkSettings,
