@@ -16,8 +16,8 @@ from nlp_gait.formulation.signals import Array
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 Expression = TypeVar("Expression", MX, SX, DM)
-# What rows refer to: an instant, changes over intervals, a mean over time, a root mean square, or no time.
-Over: TypeAlias = Literal["instant", "interval", "mean", "root-mean-square", "once"]
+# What rows refer to: an instant, changes over intervals, a mean over time, or no time.
+Over: TypeAlias = Literal["instant", "interval", "mean", "once"]
 
 
 def is_number(value: object) -> TypeGuard[float]:

@@ -9,7 +9,7 @@ from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.proofs import time_search
-from nlp_gait.proofs.time_search import GRAIN, ROUNDING, TimeRows
+from nlp_gait.proofs.time_search import GRAIN, TimeRows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,14 +101,11 @@ def _search_phase(
         search = time_search.TimeSearch(rows, given, shift, lower[:plain], upper[:plain])
         search.run(time_search.make_pieces(phase.source.kinks, shift))
         limits = np.stack([lower[plain:], upper[plain:]], axis=-1)
-        limits[[k - plain for k in phase.squares if shift is None]] **= 2
         search.sharpen_integrals(limits)
         for k, (a, b) in sorted(search.first.items()):
             piece = start + a * (end - start), start + b * (end - start)
             violations.append(_violation(rows, k, piece, float(search.least[k]), float(search.most[k])))
         for k, (low, high) in enumerate(zip(*search.integrals(), strict=True), start=plain):
-            if k in phase.squares:
-                low, high = np.sqrt(max(low, 0.0)) * (1 - ROUNDING), np.sqrt(max(high, 0.0)) * (1 + ROUNDING)
             if not rows.units[k]:
                 if np.isfinite(low) and np.isfinite(high):
                     means[rows.names[k]] = (float(low), float(high))

@@ -102,7 +102,6 @@ class TimeFunctions(NamedTuple):
 
     source: RowsOverTime  # the rows over time
     instants: TimeRows | None  # rows of each instant, and values whose time means are rows or indexes
-    squares: frozenset[int]  # indices of squares whose mean limits a root mean square
     changes: TimeRows | None  # rows of each interval
     sampled: tuple[str, ...]  # rows that are defined on samples only
 
@@ -120,22 +119,15 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
     wanted = {constraint.name for constraint in by_kind["interval"]}
     instants = [row for constraint in by_kind["instant"] for row in _select_first_sample(constraint)]
     means = [row for c in by_kind["mean"] for row in _split(c)]
-    squares = [
-        (*names, value**2, lower, upper)
-        for c in by_kind["root-mean-square"]
-        for *names, value, lower, upper in _split(c)
-    ]
     means_of = [name for name in source.means if name in still.indexes]
     indexes = [(name, name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in means_of]
-    averaged, kinks = [*means, *squares, *indexes], bool(source.kinks)
-    first = len(instants) + len(means)
+    averaged, kinks = [*means, *indexes], bool(source.kinks)
     changes = [row for c in moved.constraints if c.name in wanted for row in _select_first_sample(c)]
     given = [point.x, point.p, now]
-    numbers = frozenset(range(first, first + len(squares)))
     at_once = TimeRows(instants, averaged, given, kinks) if instants or averaged else None
     between = TimeRows(changes, [], [*given, later], kinks) if changes else None
     sampled = tuple(c.name for c in by_kind[None])
-    return TimeFunctions(source=source, instants=at_once, squares=numbers, changes=between, sampled=sampled)
+    return TimeFunctions(source=source, instants=at_once, changes=between, sampled=sampled)
 
 
 def _split(constraint: Constraint) -> list[tuple[Any, ...]]:

@@ -104,11 +104,6 @@ class Motor:
         check_numbers(f"motor {self.make!r}", self, positive=positive)
 
     @property
-    def reflected_inertia_kgm2(self) -> float | None:
-        """Inertia of the rotor at the joint: multiplied by the square of the gear ratio [kg m^2]."""
-        return None if self.rotor_inertia_gcm2 is None else self.gear_ratio**2 * self.rotor_inertia_gcm2 * 1e-7
-
-    @property
     def stall_torque_Nm(self) -> float:
         """Torque at the joint with a lossless gear [Nm]."""
         return self.gear_ratio * self.stall_torque_mNm / 1000.0
@@ -117,20 +112,6 @@ class Motor:
     def continuous_torque_Nm(self) -> float:
         """Torque at the joint with a lossless gear [Nm]."""
         return self.gear_ratio * self.continuous_torque_mNm / 1000.0
-
-    @property
-    def no_load_rad_s(self) -> float:
-        """Speed at the joint [rad/s]."""
-        return self.no_load_rpm * 2.0 * math.pi / 60.0 / self.gear_ratio
-
-    @property
-    def heat_W_per_Nm2(self) -> float:
-        """Heat of the winding per squared torque at the joint, R / (k_t gear)^2 [W/(Nm)^2].
-
-        With torque k_t I, stall torque k_t V / R and no-load speed V / k_t, this is no-load speed / stall torque at the joint:
-        the voltage V cancels. Friction, and the higher resistance of a warm winding, are neglected.
-        """
-        return self.no_load_rad_s / self.stall_torque_Nm
 
 
 ANY_ANGLE = (-math.pi, math.pi)  # limits of a joint whose file states none [rad]

@@ -25,7 +25,6 @@ OTHER: dict[str, Any] = {
     "rotational_inertia": False,
     "step_length_m": 0.07,
     "samples_per_interval": 2,
-    "motors": "limits",
     "limits": "FrictionCone",
     "drive_limits": False,
     "alike": True,

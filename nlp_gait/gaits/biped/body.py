@@ -20,7 +20,6 @@ from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory
 from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Box, Limit, Margins, compute_margins
-from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import mirror_sign
@@ -88,8 +87,8 @@ class Body(ABC):
     family: str  # first part of the names of its problems
     title: str  # its name in titles
     full: Robot  # the robot with all its joints, as it is drawn
-    simulated: Robot  # the robot of the engine, with links welded that never move and without the motors' rotors
-    motors: Motors  # with the robot as the dynamics take it
+    simulated: Robot  # the robot of the engine, with links welded that never move
+    robot: Robot  # likewise, as the dynamics take it: perhaps with point masses
     joints: tuple[str, ...]  # those whose torques and rates count
     planned: tuple[str, ...]  # those whose angles are limited
     images: tuple[str, ...]  # of every joint on the other side
@@ -121,11 +120,6 @@ class Body(ABC):
     carries_shared_arms: bool = False
     zmp_gravity: ZmpGravity = "physical"  # sign of g in the ZMP
     zmp_masses: ZmpMasses = 25  # point masses of a printed ZMP; by 23, neck and head are at the torso's centre of mass
-
-    @property
-    def robot(self) -> Robot:
-        """The robot as the dynamics take it: links welded that never move, perhaps with the inertia of its rotors."""
-        return self.motors.model
 
     def tilt_ground(self, slope_deg: float) -> Self:
         """Return the robot on ground that rises forward by an angle; raises InputError beyond ``STEEPEST_DEG``."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import casadi as ca
 from casadi import MX
@@ -16,9 +16,6 @@ HEAT_LOSS = Parameter(
     name="heat_loss_W_per_Nm2", unit="W/(Nm)^2", default=0.025, description="K, heat loss (eq. 32)", minimum=0.0
 )
 
-# Mean electrical power [W] of samples at a point, under an interpretation of absolute values.
-PowerModel: TypeAlias = Callable[[Point, Samples, Nonsmooth], MX]
-
 
 def compute_paper_power(point: Point, samples: Samples, ops: Nonsmooth) -> MX:
     """Compute the mean electrical power over time [W]: braking costs like driving, one K (eq. 32; (P.1), (P.2))."""
@@ -31,19 +28,16 @@ class Goal:
     """What is minimised: mean power, or another figure of the samples with power as an index."""
 
     objective: Objective = POWER  # name and unit
-    power: PowerModel = compute_paper_power  # of the motors; if it is not the paper's, the paper's is an index too
     figure: Callable[[Samples, Nonsmooth], MX] | None = None  # of the samples; None for power
     reads: tuple[Quantity, ...] = ()  # see ``Limit.reads``
 
     def evaluate(self, point: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX]]:
-        """Return the objective and the indexes: power, and what is minimised instead, or the power of the paper's motors."""
-        if self.figure is not None:
-            figure = self.figure(samples, ops)
-            return figure, {"power_W": compute_paper_power(point, samples, Exact()), self.objective.name: figure}
-        power = self.power(point, samples, ops)
-        if self.power is compute_paper_power:
+        """Return the objective and the indexes: power, and what is minimised instead."""
+        if self.figure is None:
+            power = compute_paper_power(point, samples, ops)
             return power, {"power_W": power}
-        return power, {"power_W": power, "paper_power_W": compute_paper_power(point, samples, Exact())}
+        figure = self.figure(samples, ops)
+        return figure, {"power_W": compute_paper_power(point, samples, Exact()), self.objective.name: figure}
 
 
 def _average_squared_rate(values: MX, samples: Samples) -> MX:
@@ -51,8 +45,8 @@ def _average_squared_rate(values: MX, samples: Samples) -> MX:
 
 
 Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
-# Goals that replace the power, by criterion.
-INSTEAD = {
+GOALS = {
+    "power": Goal(),
     "jerk": Goal(
         objective=Objective(name="joint_jerk", unit="rad^2/s^6"),
         figure=lambda samples, ops: _average_squared_rate(samples.qdd, samples),

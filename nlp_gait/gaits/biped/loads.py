@@ -62,7 +62,7 @@ def find_zmp_wrench(body: Body, chain: Chain, motions: Mapping[str, Motion], wre
     if body.zmp_masses == 23:
         torso = replace(robot.links[robot.root], com_m=body.full.links[robot.root].com_m)
         robot = replace(robot, links={**robot.links, robot.root: torso})
-    masses = replace(body, motors=replace(body.motors, robot=robot))
+    masses = replace(body, robot=robot)
     moving = compute_torques(masses, chain, motions)[1]
     if body.zmp_gravity == "physical":
         return moving

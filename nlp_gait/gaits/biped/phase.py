@@ -190,7 +190,7 @@ class Phase:
             start = sum(max(values[earlier], LEAST_DURATION) for earlier in begins)
             return start, start + max(values[self.duration], LEAST_DURATION)
 
-        intervals, means = self.grid.intervals, ("power_W", "paper_power_W", "dbm_x_mean_m", "dbm_y_mean_m")
+        intervals, means = self.grid.intervals, ("power_W", "dbm_x_mean_m", "dbm_y_mean_m")
         rows = RowsOverTime(
             name=name, assemble=assemble, times=times, intervals=intervals, means=means, kinks=self.kinks
         )

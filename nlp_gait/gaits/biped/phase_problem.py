@@ -9,7 +9,6 @@ import casadi as ca
 import numpy as np
 from casadi import MX, SX
 
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Point, Signals, SolverHints, Start
 from nlp_gait.formulation.display import (
     LEFT,
@@ -26,7 +25,7 @@ from nlp_gait.formulation.display import (
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import Body, Support, make_usual_bounds
-from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Criterion, Goal
+from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Loader
@@ -37,22 +36,6 @@ from nlp_gait.symbolic.kinematics import forward_kinematics, turn_about_vertical
 from nlp_gait.symbolic.nonsmooth import Exact
 
 DRAWS = 50  # of a start point, at most
-
-
-def make_goal(body: Body, criterion: Criterion) -> Goal:
-    """Return the goal of a criterion, with the robot's motors.
-
-    Raises InputError if the motors change the power, but something else is minimised.
-    """
-    motors = body.motors
-    if criterion != "power" and motors.power is not None:
-        raise InputError(
-            f"motors={','.join(motors.features)!r} changes the power, but the objective is "
-            f"{INSTEAD[criterion].objective.name}; leave out what changes it"
-        )
-    if criterion != "power":
-        return INSTEAD[criterion]
-    return Goal() if motors.power is None else Goal(power=motors.power)
 
 
 def make_phase_limits(body: Body, balance: limits.BalanceMargins) -> tuple[limits.Limit, ...]:
@@ -81,7 +64,7 @@ def make_phase(
     return make(
         body=body,
         loads=make_single_support_loads(body) if loads is None or kind is Support.SINGLE else loads,
-        limits=(*make_phase_limits(body, balance), *added_limits, *body.motors.limits),
+        limits=(*make_phase_limits(body, balance), *added_limits),
         standing=kind.standing,
         **fields,
     )

@@ -9,10 +9,10 @@ from nlp_gait.gaits.biped.body import Body, Support
 from nlp_gait.gaits.biped.curves import Trajectory
 from nlp_gait.gaits.biped.cycle import CycleObjective, make_cycle_problem, make_walking_cycle
 from nlp_gait.gaits.biped.footholds import Flight, parse_footholds
-from nlp_gait.gaits.biped.goals import Criterion
+from nlp_gait.gaits.biped.goals import GOALS, Criterion
 from nlp_gait.gaits.biped.loads import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import Derivatives
-from nlp_gait.gaits.biped.phase_problem import make_goal, make_phase_problem
+from nlp_gait.gaits.biped.phase_problem import make_phase_problem
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.biped.walk import plan_footstep_walk, plan_straight_walk
 
@@ -30,18 +30,6 @@ class RobotOptions:
 
     robot: str = "nao-v5"
     limits: str | AddedLimits = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class MotorOptions(RobotOptions):
-    """The robot, perhaps with its real motors.
-
-    Attributes:
-        motors: features of the real motors, separated by commas, see ``gaits.biped.motors``, if the robot's file has their data;
-            none by default
-    """
-
-    motors: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +91,7 @@ def make_support_problem(
     body: Body, options: PhaseOptions, loads: LoadOptions | None = None, derivatives: Derivatives = "analytic"
 ) -> GaitProblem:
     """Return the problem of single support, or of double support with its loads."""
-    step_m, goal = body.check_step_length(options.step_length_m), make_goal(body, options.objective)
+    step_m, goal = body.check_step_length(options.step_length_m), GOALS[options.objective]
     kind, legs = (Support.SINGLE, "one leg") if loads is None else (Support.DOUBLE, "two legs")
     minimised = "mean motor power" if options.objective == "power" else goal.objective.name.replace("_", " ")
     loader = None if loads is None else make_divided_loads(body, loads.torso_share)
@@ -144,7 +132,7 @@ class WalkOptions(GridOptions):
 
 def plan_cycle(body: Body, options: CycleOptions) -> GaitProblem:
     """Return the problem of a cycle."""
-    goal = make_goal(body, "torque" if options.objective == "torque" else "power")
+    goal = GOALS["torque" if options.objective == "torque" else "power"]
     cycle = make_walking_cycle(
         body,
         make_divided_loads(body, options.torso_share),

@@ -20,10 +20,11 @@ from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter,
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body, Support, make_lift_variable
 from nlp_gait.gaits.biped.cycle import STEP, PhaseMotion, make_cycle_margins, make_planner
 from nlp_gait.gaits.biped.footholds import Flight, Foothold, list_feet
+from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import BalanceMargins, RowsAndIndexes
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_goal, make_phase
+from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Planner
 from nlp_gait.gaits.biped.sequence import End, MotionSection, read_state
 from nlp_gait.gaits.biped.sequence import Sequence as PhaseSequence
@@ -267,7 +268,7 @@ def _make_walk(
     loads = make_divided_loads(body, "lever")
     body = replace(body, upright=frozenset()) if turning else body  # a swinging foot turns
     goal, box = (
-        make_goal(body, "power"),
+        Goal(),
         make_support_box(body.robot, {side: (0.0, body.ankle(side)[0]) for side in "LR"}),
     )
     plans = [make_walk_planner(body, right, swings=swings, turning=turning, flight=flight) for swings in (False, True)]

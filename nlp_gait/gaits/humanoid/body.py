@@ -17,7 +17,6 @@ from nlp_gait.gaits.biped.body import LEAN, RIGHT_YAW, TORSO_YAW, Angles, Body, 
 from nlp_gait.gaits.biped.footholds import Foothold, list_swings, meets
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM
-from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import GRAVITY, NAO_SWING_S, STEP_M, Biped, compare_swing, make_biped_model
@@ -139,12 +138,10 @@ def find_stiff_joint(biped: Biped, yaw: float) -> tuple[str, float] | None:
     return None
 
 
-def make_humanoid(
-    robot: str, *, drive_limits: bool = True, motors: str = "", limits: str | AddedLimits = ""
-) -> Humanoid:
+def make_humanoid(robot: str, *, drive_limits: bool = True, limits: str | AddedLimits = "") -> Humanoid:
     """Return a humanoid, by name or file, as its gaits take it; raises InputError if its legs cannot be solved.
 
-    Torques and speeds may be within the limits of the robot's file; for the motors see ``gaits.biped.motors``.
+    Torques and speeds may be within the limits of the robot's file.
     """
     biped = make_biped_model(load_robot(robot))
     left, right = biped.legs["left"], biped.legs["right"]
@@ -160,7 +157,7 @@ def make_humanoid(
         title=biped.full.name,
         full=biped.full,
         simulated=biped.model,
-        motors=Motors(features=parse_features(motors), robot=biped.model, joints=biped.joints),
+        robot=biped.model,
         joints=biped.joints,
         planned=biped.joints,
         images=(*right.joints, *left.joints),

@@ -8,8 +8,8 @@ from nlp_gait.gaits.biped.footholds import CLEARANCE_M, Flight
 from nlp_gait.gaits.biped.problems import (
     CycleOptions,
     LoadOptions,
-    MotorOptions,
     PhaseOptions,
+    RobotOptions,
     WalkOptions,
     make_support_problem,
     plan_cycle,
@@ -19,7 +19,7 @@ from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 
 
 @dataclass(frozen=True, kw_only=True)
-class HumanoidOptions(MotorOptions):
+class HumanoidOptions(RobotOptions):
     """The robot, and which of its limits count.
 
     Attributes:

@@ -1,21 +1,19 @@
-"""NAO as its gaits take it: its joints, its closed-form legs under an upright torso, the swing of its arms, its motors."""
+"""NAO as its gaits take it: its joints, its closed-form legs under an upright torso, the swing of its arms."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-import numpy as np
-from casadi import DM, MX, SX, fmax, vertcat, vertsplit
+from casadi import DM, MX, SX, vertcat
 
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import InstantPoint, Point
 from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, Support, ZmpGravity, ZmpMasses
 from nlp_gait.gaits.biped.footholds import Foothold
-from nlp_gait.gaits.biped.limits import ArmLimits, Limit, Margins, RowsAndIndexes, make_rows
-from nlp_gait.gaits.biped.motors import Motors, parse_features
-from nlp_gait.gaits.biped.samples import Instant, Samples
+from nlp_gait.gaits.biped.limits import ArmLimits, Limit, Margins
+from nlp_gait.gaits.biped.samples import Instant
 from nlp_gait.robots import Joint, Robot, load_robot
 from nlp_gait.robots.robot import Vector
 from nlp_gait.robots.tree import find_partner, make_point_masses, weld
@@ -25,7 +23,7 @@ from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
 
 LEG_JOINTS = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
 ARM_JOINTS = ("ShoulderPitch", "ShoulderRoll", "ElbowYaw", "ElbowRoll", "WristYaw")
-YAW_PITCHES = ("LHipYawPitch", "RHipYawPitch")  # one motor turns both
+YAW_PITCHES = ("LHipYawPitch", "RHipYawPitch")
 # Joints that enter the power (eq. 32): both legs with the hip yaw-pitch, and both arms.
 JOINTS = tuple(
     f"{side}{joint}" for names in (("HipYawPitch", *LEG_JOINTS), ARM_JOINTS) for side in "LR" for joint in names
@@ -118,18 +116,6 @@ ARM_SWING: dict[Support, dict[str, tuple[float, float]]] = {
 # shoulders. Rolls turn against each other in mirrored motions, so that opposite swings have equal factors.
 PER_SHOULDER = {"LShoulderPitch": 1.0, "RShoulderPitch": -1.0, "LElbowRoll": 0.22, "RElbowRoll": 0.22}
 LARGEST_SWING, LARGEST_RATE = 0.5, 1.0  # [rad], [rad/s]; Table 3 swings the shoulders by 0.5 rad to either side
-# Ankle pitch, least and greatest roll of the left ankle [rad]; straight lines between. The right ankle mirrors it.
-# Source: public MATLAB tables "Nao Parameters v4.0" (there stored under the other side's name; the greatest range is that of
-# the left joint).
-ANKLE_ROLL = (
-    (-1.189442, -0.049916, 0.075049),
-    (-0.840027, -0.179943, 0.169995),
-    (-0.700051, -0.397935, 0.220086),
-    (-0.449946, -0.397935, 0.768992),
-    (0.100007, -0.397935, 0.768992),
-    (0.349938, -0.397935, 0.550477),
-    (0.922755, 0.0, 0.049916),
-)
 ARM_COORDINATE = Coordinate(
     name="arm_swing",
     rate="arm_rate",
@@ -163,40 +149,6 @@ def move_arms(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX)
     still = SX(0)
     moved = {name: cubic(SX(a), SX(b), still, still, duration, phase) for name, (a, b) in swing.items()}
     return {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()} | moved
-
-
-def parse_nao_motors(text: str, robot: Robot) -> Motors:
-    """Return the features of NAO's motors that an option's text lists."""
-    features, coupling = parse_features(text), AnkleCoupling()
-    return Motors(features=features, robot=robot, joints=JOINTS, shared=YAW_PITCHES, coupling=coupling)
-
-
-class AnkleCoupling(Limit):
-    """Roll of both ankles within the lines over their pitch."""
-
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        angles: Mapping[str, MX] = dict(zip(samples.moving, vertsplit(samples.q), strict=True))
-        names = [str(k) for k in range(samples.steps + 1)]
-        rows = []
-        for side, sign, columns in (("L", 1.0, (1, 2)), ("R", -1.0, (2, 1))):
-            pitch, roll = (angles[f"{side}{joint}"].T for joint in ("AnklePitch", "AnkleRoll"))
-            least, greatest = (sign * limit_ankle_roll(pitch, column) for column in columns)
-            rows += [
-                make_rows(f"{side}AnkleRoll_least", "rad", roll - least, MX(0.0), None, names, "instant"),
-                make_rows(f"{side}AnkleRoll_greatest", "rad", roll - greatest, None, MX(0.0), names, "instant"),
-            ]
-        return rows, {}
-
-
-def limit_ankle_roll(pitch: MX, column: int) -> MX:
-    """Return the least (column 1) or greatest (2) roll of the left ankle over its pitch [rad], constant beyond the table."""
-    corners = np.array(ANKLE_ROLL)
-    slopes = np.diff(corners[:, column]) / np.diff(corners[:, 0])
-    turns = np.diff(np.concatenate([[0.0], slopes, [0.0]]))
-    value = MX(corners[0, column])
-    for corner, turn in zip(corners[:, 0].tolist(), turns.tolist(), strict=True):
-        value = value + turn * fmax(pitch - corner, 0.0)
-    return value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -287,7 +239,6 @@ def make_nao(
     robot: str,
     *,
     rotational_inertia: bool = True,
-    motors: str = "",
     arms: Arms = "carried",
     zmp_gravity: ZmpGravity = "physical",
     zmp_masses: ZmpMasses = 25,
@@ -296,8 +247,7 @@ def make_nao(
     """Return NAO, or a robot of its build by name or file, as its gaits take it; raises InputError for other robots.
 
     Arms are carried by the legs, or ``"separate"``: legs and torso are a chain without them, as the paper describes it;
-    ``"held"`` are carried and do not swing. Without rotational inertia every link is a point mass; for the motors see
-    ``gaits.biped.motors``.
+    ``"held"`` are carried and do not swing. Without rotational inertia every link is a point mass.
     """
     full = load_robot(robot)
     simulated = lock_unused_joints(full)
@@ -312,7 +262,7 @@ def make_nao(
         title="NAO",
         full=full,
         simulated=simulated,
-        motors=parse_nao_motors(motors, simulated if rotational_inertia else make_point_masses(simulated)),
+        robot=simulated if rotational_inertia else make_point_masses(simulated),
         joints=JOINTS,
         planned=PLANNED_JOINTS,
         images=tuple(map(find_partner, JOINTS)),

@@ -11,8 +11,8 @@ from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.problems import (
     CycleOptions,
     LoadOptions,
-    MotorOptions,
     PhaseOptions,
+    RobotOptions,
     WalkOptions,
     make_support_problem,
     plan_cycle,
@@ -26,7 +26,6 @@ PROVEN_OPTIONS = {
     "derivatives": "analytic",
     "trajectory": "cubic",
     "objective": "power",
-    "motors": "",
     "arms": "carried",
     "zmp_gravity": "physical",
     "zmp_masses": 25,
@@ -43,8 +42,8 @@ class LeastPower:
 
 
 @dataclass(frozen=True, kw_only=True)
-class NaoOptions(MotorOptions):
-    """NAO, or a robot of its build, perhaps with its real motors.
+class NaoOptions(RobotOptions):
+    """NAO, or a robot of its build.
 
     Attributes:
         rotational_inertia: false takes every link as a point mass, in torques and ZMP

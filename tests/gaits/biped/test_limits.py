@@ -11,7 +11,7 @@ from casadi import DM, MX
 from nlp_gait.formulation import Grid
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.footholds import Flight
-from nlp_gait.gaits.biped.goals import INSTEAD
+from nlp_gait.gaits.biped.goals import GOALS
 from nlp_gait.gaits.biped.limits import TorqueChange, compute_margins
 from nlp_gait.gaits.biped.phase_problem import make_level_sole
 from nlp_gait.gaits.biped.support_phases import make_support_box
@@ -42,7 +42,7 @@ def test_a_torque_changes_over_an_interval_not_over_a_sample() -> None:
 
 
 def test_the_goal_torque_is_the_mean_sum_of_squared_torques() -> None:
-    figure = INSTEAD["torque"].figure
+    figure = GOALS["torque"].figure
     assert figure is not None
     squares = (TORQUE**2).sum(axis=0)  # trapezoid: half the weight at both ends
     assert numbers(figure(make_samples(), Exact())) == pytest.approx([(squares.sum() - squares[[0, -1]].mean()) / 4])
@@ -94,4 +94,4 @@ WIDTHS = {"left": {"left_m": 0.06, "right_m": 0.02}, "right": {"left_m": 0.03, "
 def make_lopsided(body: Body) -> Body:
     """Return the body with soles that reach farther outward than inward, each by another amount."""
     feet = {side: replace(foot, **WIDTHS[side]) for side, foot in body.robot.feet.items()}
-    return replace(body, motors=replace(body.motors, robot=replace(body.robot, feet=feet)))
+    return replace(body, robot=replace(body.robot, feet=feet))

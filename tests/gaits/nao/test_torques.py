@@ -39,24 +39,6 @@ def test_single_support_equals_a_floating_base_model_with_the_foot_held(robot: s
         check_standing(problem.signals(x), model, ankle, range(11), "com")
 
 
-@pytest.mark.parametrize("robot", ["nao-v5", "nao-v6"])
-def test_rotors_add_what_pinocchios_armature_adds(robot: str) -> None:
-    problem, data = load("nao-ssp", robot=robot, motors="rotor"), load_robot(robot)
-    model = floating_model(data)
-    for name in model.names[2:]:
-        motor, at_v = data.joint(name).motor, model.joints[model.getJointId(name)].idx_v
-        assert motor is not None and motor.rotor_inertia_gcm2 is not None
-        rotor = motor.rotor_inertia_gcm2 * 1e-7 * motor.gear_ratio**2
-        model.armature[at_v] = rotor / 2 if name.endswith("HipYawPitch") else rotor  # one motor for both of these
-    ankle = np.array([0.06, 0.05, data.feet["left"].ankle_height_m])
-    x = np.array([*FEASIBLE["nao-ssp"][:-1], 0.5])  # accelerations 64 times as large
-    signals = problem.signals(x)
-    without = load("nao-ssp", robot=robot).signals(x)
-    check_standing(signals, model, ankle, (0, 3, 10))
-    np.testing.assert_array_equal(signals.arrays["zmp"], without.arrays["zmp"])  # the ground does not feel them
-    assert np.abs(signals.arrays["tau"] - without.arrays["tau"]).max() > 0.05
-
-
 @pytest.mark.parametrize("rule", ["printed", "lever"])
 def test_double_support_equals_two_floating_halves_each_on_its_foot(rule: str) -> None:
     problem, data = load("nao-dsp", torso_share=rule), load_robot("nao-v5")
