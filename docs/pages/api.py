@@ -28,7 +28,7 @@ DOORS = {
     "metaheuristics": (),
     "metaheuristics.multi_objective": ("ManyObjectives", "Snapshot", "make_front_algorithm", "minimize_many"),
     "compare": (),
-    "compare.study.run": ("Handling", "ProblemSpec", "Stop", "Run", "plan_runs"),
+    "compare.study.run": ("ProblemSpec", "Run", "plan_runs"),
     "compare.study.study": ("Study", "run_study", "read_records"),
     "compare.study.record": ("History", "RunRecord", "Times", "make_frame"),
     "compare.questions.question": ("Answer", "Question", "Work", "find"),
