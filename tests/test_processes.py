@@ -69,10 +69,6 @@ def square(number: int, send: Send) -> tuple[int, int]:
     return number * number, os.getpid()
 
 
-def is_over(end: float) -> bool:
-    return time.monotonic() > end
-
-
 @pytest.mark.parametrize("alone", [False, True])
 @pytest.mark.parametrize("method", METHODS)
 def test_each_job_ends_in_its_own_way_and_the_others_return(method: str, alone: bool) -> None:
@@ -138,7 +134,7 @@ def test_forks_yield_in_order_and_end_early_together() -> None:
             time.sleep(0.01)
         return number
 
-    assert list(run_in_forks(wait, 100, 3, partial(is_over, end))) == [0, 1, 2]
+    assert list(run_in_forks(wait, 100, 3, lambda: time.monotonic() > end)) == [0, 1, 2]
     assert time.monotonic() < started + 10.0
 
 

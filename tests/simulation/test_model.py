@@ -32,30 +32,22 @@ def test_shapes_of_a_welded_head_move_to_the_torso():
     assert any(shape.start == shape.end and shape.start[2] > 0.15 for shape in shapes["torso"])
 
 
-def plan_of(robot):
-    """A plan without a motion."""
-    signals = Signals(joints=tuple(robot.joints), arrays={}, columns={})
-    return Plan(robot=robot, full_robot=NAO, signals=signals, heat_loss=0.0, gravity=GRAVITY)
-
-
 def test_the_engine_reads_our_masses_to_the_last_digit():
     engine = pytest.importorskip("mujoco")
     robot = weld(NAO, HEAD_JOINTS)
-    model = engine.MjModel.from_xml_string(make_plan_model(plan_of(robot), Drive()))
+    signals = Signals(joints=tuple(robot.joints), arrays={}, columns={})
+    plan = Plan(robot=robot, full_robot=NAO, signals=signals, heat_loss=0.0, gravity=GRAVITY)
+    model = engine.MjModel.from_xml_string(make_plan_model(plan, Drive()))
     assert model.body_mass.sum() == pytest.approx(5.30535, abs=1e-12)
     for name, link in robot.links.items():
         body = model.body(name)
         assert body.mass[0] == link.mass_kg and tuple(body.ipos) == link.com_m
-        principal = np.linalg.eigvalsh(_tensor(link))
+        ixx, iyy, izz, ixy, ixz, iyz = link.inertia_com_kgm2
+        principal = np.linalg.eigvalsh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
         np.testing.assert_allclose(sorted(body.inertia), principal, rtol=1e-9)
     for name, joint in robot.joints.items():
         assert tuple(model.joint(name).range) == joint.limits_rad
     assert model.opt.gravity.tolist() == [0.0, 0.0, -9.8]
-
-
-def _tensor(link):
-    ixx, iyy, izz, ixy, ixz, iyz = link.inertia_com_kgm2
-    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
 
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle"])

@@ -87,12 +87,9 @@ def without_times(data: Any) -> Any:
 
 def test_every_question_is_here() -> None:
     """But one, whose smallest answer takes minutes of simulation."""
-    names = {path.stem for path in Path(compare.questions.__file__).parent.rglob("*.py") if is_question(path)}
+    paths = Path(compare.questions.__file__).parent.rglob("*.py")
+    names = {path.stem for path in paths if "(Question[" in path.read_text(encoding="utf-8")}
     assert names - {"tune"} == {case.make().name for case in CASES.values()}
-
-
-def is_question(path: Path) -> bool:
-    return "(Question[" in path.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", [name for name in CASES if name != "sweep"])  # its solves follow each other

@@ -61,14 +61,9 @@ def test_other_inputs_never_overwrite_a_run_and_the_report_shows_the_latest(chan
     assert read_records(tmp_path) == (begun, [])
 
 
-def find_key(run: Run) -> str:
-    (inputs,) = make_inputs([run])
-    return inputs.key
-
-
 def test_a_gradient_run_depends_only_on_what_it_heeds() -> None:
     def find(solver: str, **stop: Any) -> str:
-        return find_key(Run(problem=WALK, solver=solver, **stop))
+        return make_inputs([Run(problem=WALK, solver=solver, **stop)])[0].key
 
     assert find("ipopt", evaluations=300) == find("ipopt", evaluations=400)
     assert find("ipopt", time_limit_s=9.0) != find("ipopt")
