@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from docs.pages.gallery import ORDER, make_notebook, run_notebook
-from tests.docs.test_formulas import FORMULAS
+from tests.docs.test_pages import FORMULAS
 from tests.extras import need
 
 for package in ("sphinx_gallery", "nbclient", "latex2mathml"):

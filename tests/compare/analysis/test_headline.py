@@ -1,4 +1,4 @@
-"""The answer of a study: gaps from the shipped best known value of exactly this problem, what is proven, what chance may be."""
+"""The answer of a study: gaps from shipped values, what is proven, what chance may be; ranks over problems by hand."""
 
 import json
 import re
@@ -12,11 +12,13 @@ from casadi import MX
 
 import nlp_gait
 from compare.analysis.columns import format_rows
-from compare.analysis.comparison import Comparison, compare_problems
-from compare.analysis.headline import write_headline, write_headlines
+from compare.analysis.comparison import Comparison, compare_problems, count_wins, list_user_solvers, rank_over_problems
+from compare.analysis.headline import write_headline, write_headlines, write_overall_headline
 from compare.analysis.record_statistics import find_best_known
 from compare.analysis.units import describe_value
+from compare.report.document import Table
 from compare.report.study_report import write_better_points
+from compare.report.study_sections import make_overview
 from compare.study.record import RunRecord
 from compare.study.references import Reference, find_reference
 from compare.study.run import ProblemSpec, Run
@@ -214,3 +216,54 @@ def test_what_certainty_proved_in_a_folder_is_known_there(tmp_path: Path) -> Non
     better = [replace(runs[0], objective=9.9), *runs[1:]]
     (contradicted,) = compare_problems(better, folder=tmp_path / "results")
     assert contradicted.reference == 9.9 and "which is not used" in contradicted.known.source
+
+
+MEDIANS = {"walk": (1.0, 2.0, 3.0), "run": (1.0, 3.0, 2.0), "climb": (1.0, 2.0, 2.0)}
+SOLVERS = ("ipopt", "mine", "pso")
+
+
+@pytest.fixture(scope="module")
+def comparisons() -> list[Comparison]:
+    records = []
+    for problem, values in MEDIANS.items():
+        for solver, value in zip(SOLVERS, values, strict=True):
+            for run in range(8):
+                made = record(solver, run, [(10, value + 1e-3 * run)])
+                inputs = replace(made.inputs, code="0" * 64 if solver == "mine" else "")
+                records.append(replace(made, problem=problem, inputs=inputs))
+    return compare_problems(records)
+
+
+def test_ranks_and_tests_are_those_computed_by_hand(comparisons: list[Comparison]) -> None:
+    from scipy.stats import friedmanchisquare  # costs a second to import
+
+    ranking = rank_over_problems(comparisons)
+    assert ranking.mean_ranks == pytest.approx({"ipopt": 1.0, "mine": 7.5 / 3, "pso": 7.5 / 3})
+    assert ranking.friedman == pytest.approx(friedmanchisquare(*zip(*MEDIANS.values(), strict=True)).pvalue)
+    # Demsar (2006), table 5: q = 2.343 for three solvers.
+    assert ranking.critical_difference == pytest.approx(2.343 * (3 * 4 / (6 * 3)) ** 0.5, abs=1e-3)
+
+
+def test_two_solvers_have_ranks_without_tests(comparisons: list[Comparison]) -> None:
+    two = [r for c in comparisons for r in c.records if r.solver != "pso"]
+    ranking = rank_over_problems(compare_problems(two))
+    assert ranking.mean_ranks == {"ipopt": 1.0, "mine": 2.0}
+    assert ranking.friedman is None and ranking.critical_difference is None
+
+
+def test_wins_ties_and_losses_of_the_users_solver(comparisons: list[Comparison]) -> None:
+    assert list_user_solvers(comparisons) == ["mine"]
+    found = {r.other: (r.wins, r.ties, r.losses) for r in count_wins(comparisons, "mine")}
+    assert found == {"ipopt": (0, 0, 3), "pso": (1, 1, 1)}
+
+
+def test_the_matrix_marks_the_users_solver_and_the_headline_begins_with_the_users_solver(
+    comparisons: list[Comparison],
+) -> None:
+    assert write_overall_headline(comparisons).startswith("mine wins, ties and loses on problems: ")
+    matrix = next(part for part in make_overview(comparisons).parts if isinstance(part, Table))
+    assert list(matrix.columns) == ["problem", "IPOPT", "mine", "PSO"]
+    rows = {str(row[0]): row[1:] for row in matrix.rows}
+    assert [str(cell)[-1] for cell in rows["walk"]] == ["-", "%", "+"]  # worse than IPOPT, better than PSO
+    assert rows["wins/ties/losses"] == ("0/0/3", "-", "1/1/1")
+    assert rows["mean rank"] == ("1.00", "2.50", "2.50")

@@ -1,18 +1,23 @@
-"""First steps with the package."""
+"""First steps with the package; what `solve` prints: at most 40 lines, the dearest constraints first."""
 
 import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import nlp_gait
 from compare.analysis.columns import PRINTED
 from compare.cli import PANELS, app, printing
-from compare.cli.printing import PlainConsole, print_table
+from compare.cli import solve as command
+from compare.cli.printing import PlainConsole, Rows, print_table
+from nlp_gait.formulation.solution import ActiveConstraint
+from tests.backends.toys import corner, toy
 from tests.compare.cli.calls import as_json
 
 ROOT = Path(__file__).parents[3]
@@ -92,3 +97,28 @@ def test_every_setting_of_every_algorithm_is_listed_with_its_meaning():
     (swarm,) = as_json("list", "pso")["algorithms"]
     assert {"name": "inertia_damping", "default": "0.99"}.items() <= swarm["settings"][2].items()
     assert "Kennedy, Eberhart (1995)" in swarm["source"]
+
+
+@pytest.fixture(scope="module")
+def solution() -> nlp_gait.Solution:
+    """A solution of 30 variables with 50 active constraints, made from one of two."""
+    solved = nlp_gait.solve(toy(corner, limit=1.5))
+    variables = tuple(replace(solved.problem.variables[0], name=f"x{k}") for k in range(30))
+    problem = replace(solved.problem, variables=variables)
+    prices = tuple(
+        ActiveConstraint(name=f"row{k}", side="lower", bound=0.0, unit="m", price=50.0 - k, price_unit="J per m")
+        for k in range(50)
+    )
+    best = replace(solved.best, x=np.linspace(-1.0, 2.0, 30))
+    return replace(solved, problem=problem, starts=(best,), active_constraints=prices)
+
+
+def test_a_large_solution_is_shortened_largest_first(solution: nlp_gait.Solution) -> None:
+    parts = list(command._describe(solution))
+    x, constraints = (part for part in parts if isinstance(part, Rows))
+    assert [row[0] for row in x.rows[:3]] == ["x29", "x28", "x27"] and "largest" in x.title
+    assert [row[0] for row in constraints.rows] == [f"row{k}" for k in range(8)]
+    assert "and 18 more variables and 42 more active constraints: --out FILE or --json" in parts
+    # A table has its title, two lines above and one below its rows, and its header and rule.
+    lines = sum(len(part.rows) + 5 if isinstance(part, Rows) else 1 for part in parts)
+    assert lines + 5 <= 40  # with what is known about the optimum, and the file that was written
