@@ -15,10 +15,9 @@ from compare.bench.leaderboard import (
     plan_bench_runs,
     rank_solvers,
 )
-from compare.cli.command import OUTPUT, command
+from compare.cli.command import OUTPUT, Output, Rows, command, describe_command
 from compare.cli.compare import run_in_folder
 from compare.cli.options import Evaluations, Jobs, Scheduler, parse_names
-from compare.cli.printing import Output, Rows, describe_command
 from compare.report.writing import add_origin, write_document
 from compare.study.run import EVALUATIONS
 from nlp_gait.errors import InputError

@@ -10,8 +10,7 @@ from compare.analysis.columns import PRINTED, format_rows, summarise
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.headline import LiveGaps, describe_failures, describe_unknown, write_headlines
 from compare.cli import options
-from compare.cli.command import CONTINUE, OUTPUT, command
-from compare.cli.printing import Output, Rows, describe_command, say_error, show_progress
+from compare.cli.command import CONTINUE, OUTPUT, Output, Rows, command, describe_command, say_error, show_progress
 from compare.report import write_report
 from compare.study.import_runs import read_imported_records
 from compare.study.record import RunRecord

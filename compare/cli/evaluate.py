@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Option
 
 from compare.analysis.units import make_heading, with_unit
-from compare.cli.command import OUTPUT_FILE, command
+from compare.cli.command import OUTPUT_FILE, Output, Rows, command, fail
 from compare.cli.options import ProblemOptions, parse_number, parse_numbers, parse_options, parse_pairs
-from compare.cli.printing import Output, Rows, fail
 from compare.judge import Evaluation
 from compare.judge import evaluate as judge
 from compare.study.import_runs import FINALS, read_points

@@ -8,10 +8,9 @@ from typing import Annotated
 from typer import Argument, Option
 
 from compare.analysis.comparison import compare_problems
-from compare.cli.command import FORCE, OUTPUT, OUTPUT_FILE, command, report_interrupts
+from compare.cli.command import FORCE, OUTPUT, OUTPUT_FILE, Output, Rows, command, report_interrupts, show_progress
 from compare.cli.compare import describe_summaries, summarise_problems
 from compare.cli.options import RESULTS, Code, NamedProblem, name_all, parse_number
-from compare.cli.printing import Output, Rows, show_progress
 from compare.judge import find_faults
 from compare.report import renew_report, write_report
 from compare.study.import_runs import import_runs

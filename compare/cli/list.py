@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Argument, Option
 
-from compare.cli.command import OUTPUT_FILE, command
-from compare.cli.printing import Output, Rows
+from compare.cli.command import OUTPUT_FILE, Output, Rows, command
 from nlp_gait.errors import InputError
 from nlp_gait.providers import LIMITS
 from nlp_gait.user_code import find_entry_points
 
 if TYPE_CHECKING:
-    from compare.study.description import Description
+    from compare.report.provenance import Description
 
 OWN = "your own problem or algorithm can be used by name: FILE.py:NAME or MODULE:NAME; a program: cmd:COMMAND"
 ALGORITHMS = "algorithms"  # the name that stands for all of them
@@ -45,7 +44,7 @@ def list_problems(
         raise InputError("--out is the figure of a robot; give --robot FILE, and no problem")
     if name is None:
         return _list_all()
-    from compare.study.description import describe_solver, list_described_names
+    from compare.report.provenance import describe_solver, list_described_names
 
     names = list_described_names()
     if name != ALGORITHMS and name not in names:

@@ -8,8 +8,7 @@ import numpy as np
 from typer import Option
 
 from compare.cli import options
-from compare.cli.command import CONTINUE, command, describe_stored
-from compare.cli.printing import Output, Rows, describe_command, show_progress
+from compare.cli.command import CONTINUE, Output, Rows, command, describe_command, describe_stored, show_progress
 from compare.cli.simulate import ConditionOptions, DriveOptions
 from compare.questions.certainty import Certainty
 from compare.questions.pareto.pareto import Pareto, parse_searches

@@ -5,9 +5,8 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from compare.cli.command import OUTPUT, command, describe_stored
+from compare.cli.command import OUTPUT, Output, command, describe_command, describe_stored, say, show_progress
 from compare.cli.options import Code, Scheduler, name_all
-from compare.cli.printing import Output, describe_command, say, show_progress
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.papers.paper_runs import Runner
 from compare.report import FurtherFiles, renew_report

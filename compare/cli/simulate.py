@@ -12,9 +12,8 @@ import numpy as np
 from typer import Argument, Option
 
 from compare.analysis.units import format_millimetres, with_unit
-from compare.cli.command import OUTPUT, OUTPUT_FILE, command
+from compare.cli.command import OUTPUT, OUTPUT_FILE, Output, Rows, command
 from compare.cli.options import Code, name_all, parse_numbers
-from compare.cli.printing import Output, Rows
 from compare.judge import find_faults
 from compare.study.record import load_result_or_record
 from nlp_gait.errors import InputError

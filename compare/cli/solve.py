@@ -11,8 +11,7 @@ from typer import Option
 import nlp_gait
 from compare.analysis.units import describe_value, with_unit
 from compare.cli import options
-from compare.cli.command import OUTPUT_FILE, command, report_interrupts
-from compare.cli.printing import Output, Rows, fail, say, show_progress
+from compare.cli.command import OUTPUT_FILE, Output, Rows, command, fail, report_interrupts, say, show_progress
 from compare.study.references import find_reference
 from nlp_gait.backends.exact import identify_problem
 from nlp_gait.backends.plan_walk import MARGINS as MARGINS_OF_SOLE

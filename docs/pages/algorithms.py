@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import metaheuristics
-from compare.study.description import Description, describe_solver
+from compare.report.provenance import Description, describe_solver
 from docs.pages.markdown import code, literal, page, table, write_all
 from metaheuristics.multi_objective import FRONT_ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS

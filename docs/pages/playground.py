@@ -26,8 +26,7 @@ from nlp_gait.gaitbench import load
 from nlp_gait.gaitbench.c_export import export_objective, make_prefix
 from nlp_gait.gaitbench.instance import Instance
 from nlp_gait.gaits.biped.body import Support
-from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import REACH_MARGIN
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, Goal
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import ON_GROUND, list_limbs, make_level_sole, place_links
 from nlp_gait.gaits.biped.problems import GridOptions

@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 import pytest
 
 from compare.analysis.comparison import compare_problems
-from compare.cli import printing
-from compare.cli.printing import PlainConsole, escape_controls
+from compare.cli import command
+from compare.cli.command import PlainConsole, escape_controls
 from compare.drawing.figures import inline_svg, make_figure, render_svg, use_style
 from compare.report.study_report import make_study_document
 from compare.report.writing import render_markdown, render_page
@@ -111,15 +111,15 @@ def test_tables_errors_and_progress_show_them_too(monkeypatch: pytest.MonkeyPatc
     """A row's name, ``torque_change[LKneePitch, 3]``, would be taken for markup and vanish; ``[/]`` would be an error."""
     out, bar = io.StringIO(), io.StringIO()
     for stream in ("stdout", "stderr"):
-        monkeypatch.setattr(printing, stream, PlainConsole(file=out, markup=False, highlight=False, width=200))
-    printing.print_table("[red]title\x1b[31m", ("a[/]", "b\x07"), [("\x1b[2J", "[blue]")])
-    with pytest.raises(printing.typer.Exit):
-        printing.fail("no file 'a\x1b[31m\nb'")
+        monkeypatch.setattr(command, stream, PlainConsole(file=out, markup=False, highlight=False, width=200))
+    command.print_table("[red]title\x1b[31m", ("a[/]", "b\x07"), [("\x1b[2J", "[blue]")])
+    with pytest.raises(command.typer.Exit):
+        command.fail("no file 'a\x1b[31m\nb'")
     text = out.getvalue()
     assert all(shown in text for shown in (r"[red]title\x1b[31m", "a[/]", r"\x1b[2J", "[blue]"))
     assert "\x1b" not in text and "\x07" not in text and text.endswith("nlp-gait: no file 'a\\x1b[31m b'\n")
-    monkeypatch.setattr(printing, "stderr", PlainConsole(file=bar, force_terminal=True, width=200))
-    with printing.show_progress("[/] runs\x1b[2J", 2) as advance:
+    monkeypatch.setattr(command, "stderr", PlainConsole(file=bar, force_terminal=True, width=200))
+    with command.show_progress("[/] runs\x1b[2J", 2) as advance:
         advance("torque_change[LKneePitch, 3] [/]\x1b[2J")
     assert "[/] runs" in bar.getvalue() and "\x1b[2J" not in bar.getvalue()
     assert "torque_change[LKneePitch, 3]" in bar.getvalue()

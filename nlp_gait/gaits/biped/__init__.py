@@ -9,7 +9,7 @@ From a robot to the first constraint, in reading order:
     Phase     single or double support: a plan of instants over a Grid, loads, limits and a goal (``phase.py``)
     Samples   a phase evaluated at all its samples, each once (``samples.py``)
     Limit     adds rows, their parameters and performance indexes (``limits.py``)
-    Goal      what is minimised: power, torques or smoothness (``goals.py``)
+    Goal      what is minimised: power, torques or smoothness (``limits.py``)
     Assembly  objective, rows and indexes of a problem (``nlp_gait.formulation``)
 
 ``support_phases.py`` composes a phase, ``cycle.py`` joins both by the switches of ``sequence.py``, ``walk.py`` more phases;

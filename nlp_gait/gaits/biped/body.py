@@ -18,8 +18,7 @@ from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory
 from nlp_gait.gaits.biped.footholds import Foothold
-from nlp_gait.gaits.biped.goals import HEAT_LOSS
-from nlp_gait.gaits.biped.limits import Box, Limit, Margins, compute_margins
+from nlp_gait.gaits.biped.limits import HEAT_LOSS, Box, Limit, Margins, compute_margins
 from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import mirror_sign

@@ -24,8 +24,7 @@ from nlp_gait.gaits.biped.body import (
     read_duration,
 )
 from nlp_gait.gaits.biped.footholds import Foothold
-from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, compute_margins, make_rows
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, Goal, compute_margins, make_rows
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase, make_start_within_reach
 from nlp_gait.gaits.biped.samples import Instant, Loader, Planner
 from nlp_gait.gaits.biped.sequence import (

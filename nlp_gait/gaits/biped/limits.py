@@ -1,21 +1,22 @@
-"""Limits of a phase: each adds the rows, the parameters and the indexes of one concern."""
+"""Limits of a phase: each adds the rows, the parameters and the indexes of one concern; and goals, what a phase minimises."""
 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Generic, NamedTuple, TypeAlias, TypeVar
+from dataclasses import dataclass
+from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import unknown
-from nlp_gait.formulation import Constraint, InstantPoint, Over, Parameter, Point
+from nlp_gait.formulation import Constraint, InstantPoint, Objective, Over, Parameter, Point
 from nlp_gait.formulation.assembly import make_labels
 from nlp_gait.formulation.assembly import make_parameters as table
 from nlp_gait.gaits.biped.samples import BOTH_FEET, CORNERS, Quantity, Samples
 from nlp_gait.robots import Robot
-from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 # Violations that count alike in the total, by unit: 10 mm of a margin or a height count like 1 rad.
 SCALES = {"rad": 1.0, "rad/s": 1.0, "Nm": 1.0, "N": 10.0, "m": 0.01, "1": 1.0, "1/s": 10.0, "N s": 0.1, "Nm s": 0.01}
@@ -313,3 +314,55 @@ class FootClearance(Limit):
         return [make_rows_at_samples("foot_clearance", "m", above, points, MX(0.0), first=1)], {
             "foot_clearance_m": ca.mmax(samples.swing_heights)
         }
+
+
+POWER = Objective(name="power", unit="W")
+HEAT_LOSS = Parameter(
+    name="heat_loss_W_per_Nm2", unit="W/(Nm)^2", default=0.025, description="K, heat loss (eq. 32)", minimum=0.0
+)
+
+
+def compute_paper_power(point: Point, samples: Samples, ops: Nonsmooth) -> MX:
+    """Compute the mean electrical power over time [W]: braking costs like driving, one K (eq. 32; (P.1), (P.2))."""
+    mechanical = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
+    return samples.average(ca.sum1(mechanical) + point[HEAT_LOSS.name] * ca.sum1(samples.torque**2))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Goal:
+    """What is minimised: mean power, or another figure of the samples with power as an index."""
+
+    objective: Objective = POWER  # name and unit
+    figure: Callable[[Samples, Nonsmooth], MX] | None = None  # of the samples; None for power
+    reads: tuple[Quantity, ...] = ()  # see ``Limit.reads``
+
+    def evaluate(self, point: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX]]:
+        """Return the objective and the indexes: power, and what is minimised instead."""
+        if self.figure is None:
+            power = compute_paper_power(point, samples, ops)
+            return power, {"power_W": power}
+        figure = self.figure(samples, ops)
+        return figure, {"power_W": compute_paper_power(point, samples, Exact()), self.objective.name: figure}
+
+
+def _average_squared_rate(values: MX, samples: Samples) -> MX:
+    return ca.sumsqr(values[:, 1:] - values[:, :-1]) / samples.step_s**2 / samples.steps
+
+
+Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
+GOALS = {
+    "power": Goal(),
+    "jerk": Goal(
+        objective=Objective(name="joint_jerk", unit="rad^2/s^6"),
+        figure=lambda samples, ops: _average_squared_rate(samples.qdd, samples),
+        reads=(Samples.qdd,),
+    ),
+    "torque": Goal(
+        objective=Objective(name="squared_torque", unit="(Nm)^2"),
+        figure=lambda samples, ops: samples.average(ca.sum1(samples.torque**2)),
+    ),
+    "torque-smoothness": Goal(
+        objective=Objective(name="torque_rate", unit="(Nm/s)^2"),
+        figure=lambda samples, ops: _average_squared_rate(samples.torque, samples),
+    ),
+}

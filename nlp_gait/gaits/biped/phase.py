@@ -24,8 +24,7 @@ from nlp_gait.formulation.assembly import Point, RowsOverTime, Variable
 from nlp_gait.formulation.display import SIMULATED
 from nlp_gait.formulation.gait_problem import Start
 from nlp_gait.gaits.biped.body import Body
-from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, Limit
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, Goal, Limit
 from nlp_gait.gaits.biped.samples import (
     BOTH_FEET,
     LEAST_DURATION,

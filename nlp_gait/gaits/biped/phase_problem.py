@@ -25,7 +25,7 @@ from nlp_gait.formulation.display import (
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import Body, Support, make_usual_bounds
-from nlp_gait.gaits.biped.goals import HEAT_LOSS
+from nlp_gait.gaits.biped.limits import HEAT_LOSS
 from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Loader

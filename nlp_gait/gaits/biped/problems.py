@@ -9,7 +9,7 @@ from nlp_gait.gaits.biped.body import Body, Support
 from nlp_gait.gaits.biped.curves import Trajectory
 from nlp_gait.gaits.biped.cycle import CycleObjective, make_cycle_problem, make_walking_cycle
 from nlp_gait.gaits.biped.footholds import Flight, parse_footholds
-from nlp_gait.gaits.biped.goals import GOALS, Criterion
+from nlp_gait.gaits.biped.limits import GOALS, Criterion
 from nlp_gait.gaits.biped.loads import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.phase_problem import make_phase_problem

@@ -21,8 +21,15 @@ from nlp_gait.gaits.biped.body import (
 )
 from nlp_gait.gaits.biped.curves import Trajectory, move_hip
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides
-from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, Margins, SplineClearance, compute_margins
+from nlp_gait.gaits.biped.limits import (
+    REACH_MARGIN,
+    BalanceMargins,
+    Box,
+    Goal,
+    Margins,
+    SplineClearance,
+    compute_margins,
+)
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader

@@ -20,8 +20,7 @@ from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter,
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body, Support, make_lift_variable
 from nlp_gait.gaits.biped.cycle import STEP, PhaseMotion, make_cycle_margins, make_planner
 from nlp_gait.gaits.biped.footholds import Flight, Foothold, list_feet
-from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import BalanceMargins, RowsAndIndexes
+from nlp_gait.gaits.biped.limits import BalanceMargins, Goal, RowsAndIndexes
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase

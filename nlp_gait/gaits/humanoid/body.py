@@ -15,8 +15,7 @@ from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
 from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.gaits.biped.body import LEAN, RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, Support
 from nlp_gait.gaits.biped.footholds import Foothold, list_swings, meets
-from nlp_gait.gaits.biped.goals import HEAT_LOSS
-from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM
+from nlp_gait.gaits.biped.limits import HEAT_LOSS, TORQUE_CHANGE_NM
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import GRAVITY, NAO_SWING_S, STEP_M, Biped, compare_swing, make_biped_model

@@ -13,9 +13,8 @@ from typer.testing import CliRunner
 
 import nlp_gait
 from compare.analysis.columns import PRINTED
-from compare.cli import PANELS, app, printing
-from compare.cli import solve as command
-from compare.cli.printing import PlainConsole, Rows, print_table
+from compare.cli import PANELS, app, command, solve
+from compare.cli.command import PlainConsole, Rows, print_table
 from nlp_gait.formulation.solution import ActiveConstraint
 from tests.backends.toys import corner, toy
 from tests.compare.cli.calls import as_json
@@ -36,7 +35,7 @@ ROWS = [
 
 
 def printed(monkeypatch, capsys, width):
-    monkeypatch.setattr(printing, "stdout", PlainConsole(highlight=False, markup=False, width=width))
+    monkeypatch.setattr(command, "stdout", PlainConsole(highlight=False, markup=False, width=width))
     print_table("Solvers", HEADER, ROWS)
     return capsys.readouterr().out
 
@@ -51,7 +50,7 @@ def test_no_table_is_wider_than_the_terminal_and_none_loses_a_cell(monkeypatch, 
 
 
 def test_the_columns_of_a_study_fit_eighty_columns_with_names_of_sixteen_letters(monkeypatch, capsys):
-    monkeypatch.setattr(printing, "stdout", PlainConsole(highlight=False, markup=False, width=80))
+    monkeypatch.setattr(command, "stdout", PlainConsole(highlight=False, markup=False, width=80))
     row = ("genetic-algorit1", "31/31", "< 0.0001 %", "31/31", "10\u202f000", "12.3")
     print_table("Solvers", ("solver", *(column.title for column in PRINTED)), [row])
     text = capsys.readouterr().out
@@ -89,7 +88,7 @@ def test_a_broken_pipe_does_not_lose_the_solution_file(tmp_path):
 
 
 def test_every_setting_of_every_algorithm_is_listed_with_its_meaning():
-    from compare.study.description import describe_solver, list_described_names
+    from compare.report.provenance import describe_solver, list_described_names
 
     for name in list_described_names():
         found = describe_solver(name)
@@ -114,7 +113,7 @@ def solution() -> nlp_gait.Solution:
 
 
 def test_a_large_solution_is_shortened_largest_first(solution: nlp_gait.Solution) -> None:
-    parts = list(command._describe(solution))
+    parts = list(solve._describe(solution))
     x, constraints = (part for part in parts if isinstance(part, Rows))
     assert [row[0] for row in x.rows[:3]] == ["x29", "x28", "x27"] and "largest" in x.title
     assert [row[0] for row in constraints.rows] == [f"row{k}" for k in range(8)]

@@ -6,13 +6,13 @@ import time
 
 import pytest
 
-from compare.cli import printing
-from compare.cli.printing import PlainConsole, format_duration, report_silence, say, show_progress
+from compare.cli import command
+from compare.cli.command import PlainConsole, format_duration, report_silence, say, show_progress
 
 
 def test_a_line_is_rewritten_and_removed(monkeypatch: pytest.MonkeyPatch) -> None:
     written = io.StringIO()
-    monkeypatch.setattr(printing, "stderr", PlainConsole(file=written, force_terminal=True, width=100))
+    monkeypatch.setattr(command, "stderr", PlainConsole(file=written, force_terminal=True, width=100))
     with show_progress("runs", 106) as advance:
         advance("stored", 100)
         time.sleep(0.3)
@@ -30,7 +30,7 @@ def test_a_line_is_rewritten_and_removed(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_log_has_lines_also_during_one_long_step(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(printing, "LOG_PERIOD_S", 0.1)
+    monkeypatch.setattr(command, "LOG_PERIOD_S", 0.1)
 
     def wait_for(line: str) -> None:
         lines, start = list[str](), time.monotonic()

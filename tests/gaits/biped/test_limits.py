@@ -11,8 +11,7 @@ from casadi import DM, MX
 from nlp_gait.formulation import Grid
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.footholds import Flight
-from nlp_gait.gaits.biped.goals import GOALS
-from nlp_gait.gaits.biped.limits import TorqueChange, compute_margins
+from nlp_gait.gaits.biped.limits import GOALS, TorqueChange, compute_margins
 from nlp_gait.gaits.biped.phase_problem import make_level_sole
 from nlp_gait.gaits.biped.support_phases import make_support_box
 from nlp_gait.gaits.nao.body import make_nao

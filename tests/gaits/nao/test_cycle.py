@@ -7,7 +7,7 @@ import pytest
 
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.biped.cycle import make_walking_cycle
-from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.limits import Goal
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.robots import load_robot
