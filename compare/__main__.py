@@ -19,6 +19,10 @@ def fix_environment() -> None:
 
 def main() -> None:
     """Run the command line."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        sys.exit("nlp-gait: the working folder does not exist any more; change to another one")
     exit_on_interrupt()
     fix_environment()
     try:

@@ -6,10 +6,12 @@ package's ``compare``: with ``-m`` the folder counts only if the package itself 
 
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 
-if sys.path[0] in ("", os.getcwd()) and Path(__file__).parents[1] != Path.cwd():
-    del sys.path[0]
+with suppress(FileNotFoundError):  # main reports a working folder that is gone
+    if sys.path[0] in ("", os.getcwd()) and Path(__file__).parents[1] != Path.cwd():
+        del sys.path[0]
 
 from compare.__main__ import main
 

@@ -34,6 +34,7 @@ ROWS_WIDTH, ROW = 440, 22  # of a chart with named rows, and height of a row
 TOP, RIGHT, BOTTOM, LEFT = 8, 10, 40, 62  # margins of the axes
 GRID = "#d0d0d0"
 DASHES = {"-": "", "--": "6 4", ":": "2 3", "-.": "7 3 2 3"}
+LARGEST_GAP = 1e300  # that is drawn
 FACTORS = (1, 2, 5)  # of powers of ten, at ticks
 
 
@@ -233,8 +234,8 @@ def _trace_gaps(solver: SolverRuns, axis: str) -> list[Series]:
 
 
 def clip_percent(gap: Array) -> Array:
-    """Return the gap in percent; smaller ones than ``SMALLEST_GAP`` are drawn at it."""
-    return 100.0 * np.maximum(gap, SMALLEST_GAP)
+    """Return the gap in percent; those beyond ``SMALLEST_GAP`` and ``LARGEST_GAP`` are drawn at them."""
+    return np.clip(gap, SMALLEST_GAP, LARGEST_GAP) * 100.0
 
 
 def make_ecdf_charts(comparisons: Sequence[Comparison], *, per_variable: bool = False) -> list[Chart]:

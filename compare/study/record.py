@@ -197,6 +197,9 @@ def parse_record(raw: Any) -> RunRecord:
     counts = (record.run, record.seed, record.failed_evaluations, record.iterations, *record.counts.values())
     if min(counts) < 0 or any(a > b for a, b in itertools.pairwise((0, *history.evaluations))):
         raise ValueError("counts must be at least 0, and those of the history ascend")
+    times, course = attrgetter("build", "compile", "solve", "objective")(record.time_s), record.time_s.history
+    if any(time < 0.0 for time in times) or any(a > b for a, b in itertools.pairwise((0.0, *course))):  # NaN is neither
+        raise ValueError("times must be at least 0, and those of the history ascend")
     unknown = record.inputs.imported and not record.counts and not history.evaluations
     if not unknown and ("f" not in record.counts or not set(CALLS).issuperset(record.counts)):
         raise ValueError(f"counts must be of {', '.join(sorted(CALLS))}, among them f")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.__main__ import fix_environment
+from compare.__main__ import fix_environment, main
 from nlp_gait import load
 from tests.compare.cli.calls import nlp_gait, one_sentence
 from tests.faults.processes import ROOT, in_own_mounts
@@ -126,3 +126,11 @@ def test_a_terminal_without_a_width_has_the_usual_one(width: str, monkeypatch: p
     monkeypatch.setenv("MPLBACKEND", "nonsense")
     fix_environment()
     assert os.environ.get("COLUMNS") == ("80" if width == "80" else None) and os.environ["MPLBACKEND"] == "agg"
+
+
+def test_a_working_folder_that_is_gone_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(SystemExit, match="the working folder does not exist any more; change to another one"):
+        main()

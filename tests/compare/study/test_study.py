@@ -68,6 +68,7 @@ def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
         (good[: len(good) // 2], "is not valid JSON"),
         ("[]", f"'schema' must be {SCHEMA}, got 'list'"),
         (good.replace(f'"schema": {SCHEMA}', '"schema": 0'), f"'schema' must be {SCHEMA}, got 0"),
+        (good.replace('"build": ', '"build": -1'), "times must be at least 0"),
         (good.replace('"history": {', '"history": 3, "other": {'), "damaged"),
         (good.replace(' "failed_evaluations": 0,\n', ""), "failed_evaluations is missing"),
         (good.replace(' "feasible": true,\n', ""), "feasible is missing"),
