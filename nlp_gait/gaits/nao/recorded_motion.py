@@ -29,7 +29,7 @@ SAME_TIME_S = 1e-9
 LIFTED = 2e-3  # [m]; a foot that rises by less stands
 STILL = 1e-5  # [m]; a foot nearer than this to its last place has landed, or than SCATTER times its noise
 SCATTER = 4.0 * math.sqrt(2.0)  # standard deviations of the difference of two places, four of them
-FAR = 16.0  # from so many times the distance of a still foot, a swing's end is fitted
+FAR = 4.0  # from so many times the distance of a still foot, a swing's end is fitted
 NOISE_RAD = 1e-5  # smaller ones are ignored: angles with five decimals
 LARGEST_ANGLE = 4.0 * math.pi  # [rad]; larger ones are degrees, and those beyond half a turn wrapped
 LARGEST_PERIOD_S = 0.5  # between two rows; larger ones are milliseconds
@@ -121,19 +121,24 @@ class RecordedMotion:
         lifted = LIFTED + 2.0 * scatter
         if foot[:, 2].max() < lifted and np.ptp(foot[:, :2], axis=0).max() < lifted:
             return {Support.DOUBLE: (0.0, end)}
-        landing = self._landing(np.linalg.norm(foot - foot[-1], axis=1), max(STILL, scatter))
+        landing = self._landing(foot, max(STILL, scatter))
         if end - landing < LEAST_SHARE * end:
             return {Support.SINGLE: (0.0, end)}
         return {Support.SINGLE: (0.0, landing), Support.DOUBLE: (landing, end)}
 
-    def _landing(self, distance: Array, still: float) -> float:
-        """Estimate when a foot lands from its distance to its last place (T,) [m], a parabola where a swing ends at rest."""
+    def _landing(self, foot: Array, still: float) -> float:
+        """Estimate when a foot at places (T, 3) [m] lands, by least squares: a parabola ends a swing at rest, then it stands."""
+        distance = np.linalg.norm(foot - foot[-1], axis=1)
         last = int(np.flatnonzero(distance >= still)[-1])
         begin = int(np.flatnonzero(distance[: last + 1] > FAR * still)[-1:].sum())
         begin = max(min(begin, last - 2), 0)
-        slope, at_zero = np.polyfit(self.t[begin : last + 1], np.sqrt(distance[begin : last + 1]), 1)
-        landing = max(self.t[last], -at_zero / slope) if slope < 0.0 else self.t[last]
-        return float(self.t[np.argmin(np.abs(self.t - landing))])
+        t, places = self.t[begin:], foot[begin:]
+
+        def miss(landing: float) -> float:
+            columns = np.column_stack([np.ones(len(t)), np.maximum(landing - t, 0.0) ** 2])
+            return float(np.square(places - columns @ np.linalg.lstsq(columns, places)[0]).sum())
+
+        return float(min(t[2:].tolist(), key=miss, default=t[-1]))
 
 
 def estimate_noise(samples: Array) -> Array:

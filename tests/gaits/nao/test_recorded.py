@@ -179,12 +179,16 @@ def test_phases_and_power_survive_rounding_and_noise(tmp_path: Path) -> None:
         assert judged(gait).indexes["power_W"] == pytest.approx(power, rel=0.1)
 
 
-@pytest.mark.parametrize(("period_ms", "touch_down_s"), [(20, 2.2), (5, 2.2), (20, 2.205)])
-def test_noise_of_an_encoder_costs_no_power(period_ms: int, touch_down_s: float, tmp_path: Path) -> None:
-    """Noise of 2 mrad; estimated for each joint by itself it changed the power by up to 100 %."""
+@pytest.mark.parametrize(("period_ms", "touch_down_s"), [(20, 2.2), (5, 2.2), (20, 2.205), (20, None)])
+def test_noise_of_an_encoder_costs_no_power(period_ms: int, touch_down_s: float | None, tmp_path: Path) -> None:
+    """Noise of 2 mrad; estimated for each joint by itself it changed the power by up to 100 %.
+
+    Touch-down is at 2.2 s; inferred from the distance of the foot alone it was 120 ms late, and the power 14 % too high.
+    """
     angles = angles_of(written(tmp_path, "nao-cycle", period_ms))
     noise = np.random.default_rng(0).normal(0.0, 2e-3, angles.q.shape)
     gait = make_recorded_gait(replace(angles, q=angles.q + noise), touch_down_s=touch_down_s)
+    assert gait.x[0] == pytest.approx(2.2, abs=0.025)
     assert judged(gait).indexes["power_W"] == pytest.approx(
         evaluate(planned("nao-cycle").problem, planned("nao-cycle").x, prove=False).indexes["power_W"], rel=0.05
     )
