@@ -199,7 +199,7 @@ class Phase:
         """Return time histories at a point of numbers."""
         n = self.grid.parts + 1
         phases = DM(np.linspace(0.0, 1.0, n)).T
-        evaluated = self._evaluate_stages(self._history_stages, point, phases)
+        evaluated = self._evaluate_histories(point, phases)
         histories = {quantity: _to_array(values) for quantity, values in evaluated.items()}
         arrays = {
             "t": _to_array(point[self.duration] * phases)[:, 0],
@@ -216,6 +216,9 @@ class Phase:
             arrays["feet_yaw"] = np.column_stack([np.zeros(n), histories[Samples.yaw]])
         columns = COLUMNS | {name: SIMULATED[name] for name in ("attitude", "feet_yaw") if name in arrays}
         return Signals(joints=self.body.joints, arrays=arrays, columns=columns)
+
+    def _evaluate_histories(self, point: NumericPoint, phases: DM) -> dict[Quantity, Any]:
+        return self._evaluate_stages(self._history_stages, point, phases)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:

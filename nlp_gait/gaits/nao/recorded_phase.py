@@ -64,7 +64,7 @@ class RecordedPhase(Phase):
         motion.store(self.usual, evaluate(self.usual))
         return motion
 
-    def _evaluate_histories(self, point: NumericPoint) -> dict[Quantity, Any]:
+    def _evaluate_histories(self, point: NumericPoint, phases: DM) -> dict[Quantity, Any]:
         return self._evaluate_quantities(IN_TIME, point)
 
     def _evaluate_quantities(self, quantities: Sequence[Quantity], point: Any) -> dict[Quantity, Any]:
