@@ -34,6 +34,13 @@ LARGEST_RESULT = 256 * 2**20  # bytes
 JOINT_FREE, JOINT_HINGE, JOINT_TRANSMISSIONS = 0, 3, (0, 1)  # mjJNT_FREE, _HINGE; mjTRN_JOINT and mjTRN_JOINTINPARENT
 
 
+# By a part of MuJoCo's message.
+REMEDIES = {
+    "opening file": "; meshes must be where the file names them (its meshdir)",
+    "unrecognized attribute": "; this version of MuJoCo has no such attribute: remove it",
+}
+
+
 def read_mjcf(path: str) -> RobotParts:
     """Read the links and joints of an MJCF file.
 
@@ -66,7 +73,7 @@ def read_mjcf(path: str) -> RobotParts:
         if model.nu and not model.jnt_actfrclimited[hinge] and hinge not in _list_driven(model)
     }
     for equality in range(model.neq):
-        kind = _name(model, "mjtEq", "mjEQ_", model.eq_type[equality])
+        kind = _name("mjtEq", "mjEQ_", model.eq_type[equality])
         coupled = f"is coupled by the equality {kind!r}: closed chains are not supported"
         bodies = [names[body] for body in _list_coupled_bodies(model, equality, kind) if body in names]
         unusable |= {carriers[body]: coupled for body in bodies}
@@ -93,7 +100,7 @@ def _read_turning(model: Any, hinge: int, parent: str, child: str, axis: Array) 
     )
 
 
-def _name(model: Any, kind: str, prefix: str, number: int) -> str:
+def _name(kind: str, prefix: str, number: int) -> str:
     return str(getattr(import_module("mujoco"), kind)(int(number)).name.removeprefix(prefix).lower())
 
 
@@ -108,7 +115,7 @@ def _list_coupled_bodies(model: Any, equality: int, kind: str) -> list[int]:
     """Return the bodies that an equality couples, behind the joints of one of joints."""
     numbers = [int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])]
     of_object = {"joint": model.jnt_bodyid, "site": model.site_bodyid, "body": range(model.nbody)}
-    coupled = kind if kind == "joint" else _name(model, "mjtObj", "mjOBJ_", model.eq_objtype[equality])
+    coupled = kind if kind == "joint" else _name("mjtObj", "mjOBJ_", model.eq_objtype[equality])
     return [int(of_object[coupled][number]) for number in numbers if coupled in of_object and number >= 0]
 
 
@@ -220,7 +227,7 @@ def _compile_binary(mujoco: Any, path: str) -> bytes:
 
 def _convert(path: str, error: Exception) -> RobotDataError:
     reason = " ".join(str(error).split())[:300] or type(error).__name__
-    remedy = "; meshes must be where the file names them (its meshdir)" if "opening file" in reason else ""
+    remedy = next((text for mark, text in REMEDIES.items() if mark in reason), "")
     return RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}{remedy}")
 
 
@@ -284,7 +291,7 @@ def _find_torque_limit(model: Any, joint: int) -> float:
 
 def _list_shape_points(model: Any, geom: int, pose: Array) -> tuple[str, Array]:
     """Return the kind of a shape and its points (N, 3)."""
-    kind = _name(model, "mjtGeom", "mjGEOM_", model.geom_type[geom])
+    kind = _name("mjtGeom", "mjGEOM_", model.geom_type[geom])
     if kind == "mesh":
         mesh = int(model.geom_dataid[geom])
         first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])

@@ -54,6 +54,11 @@ def test_mujocos_translation_of_a_urdf_is_the_same_robot(path: str) -> None:
         ("<worldbody>", "<wordbody>", "is not read by MuJoCo"),
         (
             "<worldbody>",
+            '<option><flag sensornoise="enable"/></option><worldbody>',
+            "'sensornoise' .* such attribute: remove",
+        ),
+        (
+            "<worldbody>",
             '<asset><mesh file="no.stl"/></asset><worldbody>',
             "no.stl'; meshes must be where the file names",
         ),
