@@ -200,10 +200,11 @@ class Constraint:
             raise InputError(f"{owner}: lower, upper or both are required")
         _, lower, upper = self.columns
         if lower.is_constant() and upper.is_constant():
-            inverted = np.flatnonzero(np.array(lower.to_DM() > upper.to_DM()).ravel())
-            if inverted.size:
-                low, high = (float(bound.to_DM()[int(inverted[0])]) for bound in (lower, upper))
-                raise InputError(f"{owner}: lower must not be above upper, got {low:g} and {high:g}")
+            low, high = (bound.to_DM().full().ravel() for bound in (lower, upper))
+            wrong = np.flatnonzero((low > high) | (low == np.inf) | (high == -np.inf))
+            if wrong.size:
+                ends = f"lower {low[wrong[0]]:g} and upper {high[wrong[0]]:g}"
+                raise InputError(f"{owner}: no number is between {ends}")
         if isinstance(self.labels, str) or len(self.labels) != (len(self.labels) and m) or (m != 1 and not self.labels):
             raise InputError(
                 f"{owner}: value has {m} rows and labels has {len(self.labels)}; give one label per row"

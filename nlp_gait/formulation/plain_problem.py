@@ -84,8 +84,8 @@ def _make(parts: _Parts, objective: Objective, tolerance: float) -> GaitProblem:
         Variable(name=name, unit=unit, lower=low, upper=high)
         for name, (low, high, unit) in zip(names, parts.bounds, strict=True)
     )
-    if not tolerance >= 0.0:
-        raise InputError(f"tolerance must be >= 0, got {tolerance}")
+    if not 0.0 <= tolerance < math.inf:
+        raise InputError(f"tolerance must be >= 0 and finite, got {tolerance}")
     values, lows, highs = ([row[k] for row in parts.rows.values()] for k in range(3))
     function = ca.Function("problem", [*parts.x, *parts.p], [parts.f, *values])
     limits = ca.Function("limits", list(parts.p), [*lows, *highs])
@@ -230,8 +230,10 @@ def _read_dictionary(nlp: Mapping[str, Any], p: Any, bounds: Mapping[str, Any]) 
     if "x" not in nlp or "f" not in nlp:
         raise InputError("CasADi's dictionary needs at least x and f")
     for key, value in nlp.items():
-        if not isinstance(value, type(nlp["x"])):
-            raise InputError(f"{key} of CasADi's dictionary must be an expression as x is, got {format_value(value)}")
+        if not isinstance(value, (MX, SX)) or type(value) is not type(nlp["x"]):
+            raise InputError(f"{key} of CasADi's dictionary must be MX or SX as x is, got {format_value(value)}")
+        if key in "xp" and (not value.is_valid_input() or sum(s.numel() for s in ca.symvar(value)) != value.numel()):
+            raise InputError(f"{key} of CasADi's dictionary must be different symbols, got {format_value(value)}")
     symbols, kind = ca.symvar(nlp["x"]), type(nlp["x"])
     g, given = nlp.get("g", kind(0, 1)), nlp.get("p", kind(0, 1))
     n, m = nlp["x"].numel(), g.numel()
@@ -258,6 +260,8 @@ def _read_opti(opti: ca.Opti) -> _Parts:
     symbols, parameters = ([s for s in ca.symvar(column)] for column in (opti.x, opti.p))
     if opti.f.is_constant():
         raise InputError("the Opti stack has no objective; call minimize first")
+    if not opti.ng:
+        raise InputError("the Opti stack has no bounds of its variables: opti.subject_to(opti.bounded(low, x, high))")
     for symbol in symbols:
         if opti.advanced.get_meta(symbol).domain != ca.OPTI_DOMAIN_REAL:
             remedy = "relax it, or use a mixed-integer solver such as Bonmin"

@@ -110,6 +110,12 @@ def opti_with_an_integer() -> Any:
     return opti
 
 
+def opti_without_bounds() -> ca.Opti:
+    opti = ca.Opti()
+    opti.minimize((opti.variable() - 1.5) ** 2)
+    return opti
+
+
 X, Y = SX.sym("x"), SX.sym("y")
 BOX = {"x": (0, 1), "y": (0, 1)}
 
@@ -121,17 +127,24 @@ BOX = {"x": (0, 1), "y": (0, 1)}
         ((X,), {"x": BOX}, "no expression contains 'y'; they contain x"),
         ((X + Y,), {"x": BOX | {"x": (2, 1)}}, "variable 'x': lower must be below upper, got 2.0 and 1.0"),
         ((X + Y + SX.sym("x"),), {"x": BOX}, "two symbols have the same name 'x'"),
-        ((X + Y,), {"x": BOX, "tolerance": -1.0}, "tolerance must be >= 0, got -1.0"),
+        ((X + Y,), {"x": BOX, "tolerance": -1.0}, "tolerance must be >= 0 and finite, got -1.0"),
         ((X + Y, [True]), {"x": BOX}, "constraint g1 must be a comparison of SX expressions, .*, got True"),
         ((X + Y, [SX(1) <= X / X * 0 + SX.sym("c")]), {"x": BOX, "p": {"c": 1}}, "constraint g1 contains no variable"),
         (({"x": X, "f": X},), {"lbx": [0, 1], "ubx": 1}, "lbx must be one number, got 2"),
         (
             ({"x": X, "f": 3.0},),
             {"lbx": 0, "ubx": 1},
-            "f of CasADi's dictionary must be an expression as x is, got 3.0",
+            "f of CasADi's dictionary must be MX or SX as x is, got 3.0",
         ),
         (({"x": X, "p": Y, "f": X},), {"lbx": 0, "ubx": 1}, r"p \(y\) must be one number, got 0"),
         (({"x": X, "f": X * Y},), {"lbx": 0, "ubx": 1}, "f or g contains 'y', which is neither in x nor in p"),
+        (({"x": X + 1, "f": X},), {"lbx": 0, "ubx": 1}, "x of CasADi's dictionary must be different symbols, got"),
+        (
+            ({"x": ca.vertcat(X, X), "f": X},),
+            {"lbx": 0, "ubx": 1},
+            "x of CasADi's dictionary must be different symbols",
+        ),
+        ((opti_without_bounds(),), {}, "the Opti stack has no bounds of its variables"),
         ((opti_with_an_integer(),), {}, "is an integer variable; problems here are continuous: relax it"),
     ],
 )
