@@ -104,7 +104,7 @@ def test_messages_say_what_is_wrong_with_the_file(text: str, message: str, tmp_p
             {"value": THREE, "labels": ("a", "b", "c"), "lower": 0.5, "upper": MX([1.0, 0.0, 1.0])},
             "'knee': no number is between lower 0.5 and upper 0",
         ),
-        ({"lower": ca.inf, "upper": ca.inf}, "'knee': no number is between lower inf and upper inf"),
+        ({"lower": float("inf"), "upper": float("inf")}, "'knee': no number is between lower inf and upper inf"),
     ],
 )
 def test_a_row_is_refused_by_name(change: dict[str, Any], message: str) -> None:
