@@ -111,7 +111,10 @@ class GaitProblem:
         counts = Counter([*self.names, *(parameter.name for parameter in self.parameters)])
         duplicates = [name for name, count in counts.items() if count > 1]
         if duplicates:
-            raise InputError(f"problem {self.name!r}: variables or parameters are duplicated: {', '.join(duplicates)}")
+            names = ", ".join(duplicates)
+            raise InputError(
+                f"problem {self.name!r}: two variables or parameters are named {names}; rename one of them"
+            )
 
     def __repr__(self) -> str:
         goal, n = self.objective, len(self.variables)

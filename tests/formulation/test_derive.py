@@ -126,7 +126,7 @@ def test_the_compiled_objective_and_the_judge_see_it(walk: GaitProblem) -> None:
     ids=["a parameter", "a bound", "a variable"],
 )
 def test_duplicated_names_are_refused(more: dict[str, Any], twice: str) -> None:
-    with pytest.raises(InputError, match=f"problem 'toy': variables or parameters are duplicated: {twice}$"):
+    with pytest.raises(InputError, match=f"problem 'toy': two variables or parameters are named {twice}; rename"):
         toy(corner).derive(**more)
 
 

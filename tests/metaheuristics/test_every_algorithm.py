@@ -1,4 +1,4 @@
-"""The suite that every search algorithm passes; a new one only joins the list below."""
+"""The suite that every search algorithm passes; a new one needs a line of ``ENDS``."""
 
 import dataclasses
 import pickle

@@ -122,12 +122,14 @@ def list_hip_ranges(result: NaoResults, searches: Iterable[str]) -> list[float]:
 
 def list_swing_shares(result: NaoResults) -> list[float]:
     """Return the share of the swing leg in the power of the hips, with heat, and of its mechanical part [%]."""
+    from scipy.integrate import trapezoid
+
     signals, problem = result.sample("ssp"), make_spec("ssp", result.reading).load()
     t, tau, qd = (signals.arrays[name] for name in ("t", "tau", "qd"))
     mechanical, heat = np.abs(tau * qd), problem.value("heat_loss_W_per_Nm2") * tau**2
     shares = []
     for power in (mechanical + heat, mechanical):
-        energies = dict(zip(signals.joints, np.trapezoid(power, t, axis=0), strict=True))
+        energies = dict(zip(signals.joints, trapezoid(power, t, axis=0), strict=True))
         swing, support = (sum(energies[f"{side}Hip{axis}"] for axis in ("Roll", "Pitch")) for side in "RL")
         shares.append(100 * swing / (swing + support))
     return shares

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.biped.cycle import make_walking_cycle
@@ -111,7 +112,7 @@ def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampl
         energy, step = 0.0, 0.03 * sum(times)
         for signals in halves:
             tau, qd, t = (signals.arrays[name] for name in ("tau", "qd", "t"))
-            energy += float(np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t))
+            energy += float(trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t))
         power = evaluated(at_speed, x).cost
         assert power == pytest.approx(energy / sum(times), rel=ROUNDING)
         per_metre = evaluated(free, np.append(x, step)).cost
