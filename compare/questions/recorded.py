@@ -66,7 +66,7 @@ def judge_gait(gait: RecordedGait, *, in_engine: bool = True, starts: int = STAR
     if noise := float(gait.motion.noise_rad.max()):
         notes.append(
             f"angles are smoothed: noise or rounding of {noise:.1g} rad; torques and margins stay uncertain: 2 mrad raised the "
-            "power of tested cycles by 1 to 19 %"
+            "power of two cycles by up to 31 %"
         )
     if gait.motion.held:
         notes.append(f"held, because they are not in the file: {', '.join(gait.motion.held)}")
