@@ -125,7 +125,7 @@ def test_objectives_variables_and_parameters_are_refused_by_name() -> None:
     with pytest.raises(InputError, match="parameter 'mass': default must be a finite number, got None"):
         Parameter(name="mass", unit="kg", default=None, description="")  # type: ignore[arg-type]
     x = Variable(name="x", unit="m", lower=0.0, upper=1.0, description="")
-    with pytest.raises(InputError, match="duplicated: x"):
+    with pytest.raises(InputError, match="are named x, x.lower, x.upper; rename"):
         replace(toy(corner), variables=(x, x))
 
 
