@@ -116,6 +116,8 @@ class Tune(Question[list[TunedGait]]):
             raise InputError(
                 f"{self.problem.name} has no energy per metre; tune a walking cycle or a whole walk: nao-cycle"
             )
+        for limits in self._grid:
+            self.problem.with_values(**limits)  # raises for unknown names and values that are not allowed
         inputs = {**identify_problem(self.problem), "steps": (self.steps, self.judged_steps), "starts": self.starts}
         inputs |= {"drive": asdict(self.drive), "conditions": asdict(self.conditions)}
 
