@@ -156,5 +156,6 @@ def unpack_archive(path: Path, folder: Path) -> None:
                 if entry.filename.count("/") > MOST_LEVELS:
                     raise ValueError(f"{entry.filename!r} is more than {MOST_LEVELS} folders deep")
                 archive.extract(entry, folder)
+    # What zipfile raises for damaged archives, unknown compressions and passwords
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError) as error:
         raise InputError(f"{owner} is damaged: {error}") from error

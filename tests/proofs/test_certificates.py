@@ -81,7 +81,7 @@ ROW = 7  # doubles of a box: four ends, bound, cut, depth
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """Return the checkpoint of a proof whose time ended with some open boxes."""
     file, notes = tmp_path_factory.mktemp("proof") / "open", list[str]()
 
@@ -102,8 +102,8 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 
 
 @pytest.mark.parametrize("name", [*DAMAGES, "other tolerance"])
-def test_a_damaged_checkpoint_is_one_sentence(name: str, written: bytes, tmp_path: Path) -> None:
-    (tmp_path / "open").write_bytes(DAMAGES[name](written) if name in DAMAGES else written)
+def test_a_damaged_checkpoint_is_one_sentence(name: str, checkpoint: bytes, tmp_path: Path) -> None:
+    (tmp_path / "open").write_bytes(DAMAGES[name](checkpoint) if name in DAMAGES else checkpoint)
     tolerance = 1e-4 if name in DAMAGES else 1e-5
     with pytest.raises(InputError, match="damaged, or of another problem, .*; delete it to start the proof again$"):
         certify(PROBLEM, BEST, tolerance=tolerance, checkpoint=tmp_path / "open")

@@ -53,29 +53,29 @@ def test_all_are_the_installed_searches_and_both_gradient_methods(monkeypatch: p
 FAILING = "compare walk12 --algorithms pso,ga --runs 2 --starts 0 --evaluations 100 --jobs 1".split()
 
 
-def failing(monkeypatch: pytest.MonkeyPatch, calls: int) -> None:
+def make_pso_fail(monkeypatch: pytest.MonkeyPatch, calls: int) -> None:
     """The first runs of PSO fail."""
     start, done = ParticleSwarm.start, 0
 
-    def counted(self: ParticleSwarm, *arguments: Any) -> Any:
+    def start_or_fail(self: ParticleSwarm, *arguments: Any) -> Any:
         nonlocal done
         done += 1
         if done <= calls:
             raise RuntimeError("no home")
         return start(self, *arguments)
 
-    monkeypatch.setattr(ParticleSwarm, "start", counted)
+    monkeypatch.setattr(ParticleSwarm, "start", start_or_fail)
 
 
 def test_a_solver_without_any_run_ends_a_comparison_with_status_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    failing(monkeypatch, 1)
+    make_pso_fail(monkeypatch, 1)
     with_a_run_left = nlp_gait(*FAILING, "--out", tmp_path / "left")
     assert with_a_run_left.stderr.startswith("nlp-gait: walk12, PSO: 1 of 2 runs have no result (run 0 failed: ")
     assert with_a_run_left.stderr.count("\n") == 1
     monkeypatch.undo()
-    failing(monkeypatch, 2)
+    make_pso_fail(monkeypatch, 2)
     first, last = nlp_gait(*FAILING, "--out", tmp_path, status=1).stderr.splitlines()
     assert first == "nlp-gait: walk12, PSO: both runs have no result (run 0 failed: RuntimeError: no home)"
     assert last.startswith("nlp-gait: without any result: pso; fix the cause")
