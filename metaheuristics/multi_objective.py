@@ -30,7 +30,9 @@ class ManyObjectives(Bounded, Protocol):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class MultiObjective(PymooSettings):
-    """An algorithm of pymoo for several objectives, ``"NSGA2"`` or ``"CMOPSO"``; a population of 100 is pymoo's own choice.
+    """An algorithm of pymoo for several objectives.
+
+    It is ``"NSGA2"`` or ``"CMOPSO"``; a population of 100 is pymoo's own choice.
 
     Source:
         Deb et al. (2002), NSGA-II; Zhang et al. (2018), A competitive mechanism based multi-objective particle swarm

@@ -1,4 +1,4 @@
-"""Problems and limits of this package by name, each with the place of its definition, which is imported on first use.
+"""Problems of this package by name, each with the place of its definition, which is imported on first use.
 
 The command line imports this module before everything else, so it imports nothing that takes time.
 """
@@ -24,7 +24,7 @@ PROBLEMS = {
     "stairs-climb": "nlp_gait.gaits.stairs.climb:stairs_climb",
     "gaitbench": "nlp_gait.gaitbench.generated:gaitbench",
 }
-LIMITS = {name: f"nlp_gait.gaits.biped.limits:{name}" for name in ("FrictionCone", "FootClearance")}
+LIMITS = "nlp_gait.limits:LIMITS"  # the table of limits
 
 
 def import_object(place: str) -> Any:

@@ -13,7 +13,6 @@ from typer import Argument, Option
 
 from compare.cli.command import OUTPUT_FILE, Output, Rows, command
 from nlp_gait.errors import InputError
-from nlp_gait.providers import LIMITS
 from nlp_gait.user_code import find_entry_points
 
 if TYPE_CHECKING:
@@ -33,9 +32,9 @@ def list_problems(
     robot: Annotated[str | None, Option(metavar="FILE")] = None,
     out: Annotated[Path | None, OUTPUT_FILE] = None,
 ) -> Output:
-    """List problems, algorithms and robots, or describe one of them.
+    """List problems, algorithms, limits and robots, or describe one of them.
 
-    Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`,
+    Examples: `nlp-gait list`, `nlp-gait list algorithms`, `nlp-gait list limits`, `nlp-gait list nao-ssp`, `nlp-gait list pso`,
     `nlp-gait list --robot my_robot.urdf --out my_robot.png`, `nlp-gait list humanoid-cycle --robot my_robot.urdf`
     """
     if robot is not None and name is None:
@@ -44,6 +43,8 @@ def list_problems(
         raise InputError("--out is the figure of a robot; give --robot FILE, and no problem")
     if name is None:
         return _list_all()
+    if name == "limits":
+        return _list_limits()
     from compare.report.provenance import describe_solver, list_described_names
 
     names = list_described_names()
@@ -52,8 +53,23 @@ def list_problems(
     if robot is not None:
         raise InputError("--robot takes a problem, or no name")
     algorithms = [describe_solver(one) for one in (names if name == ALGORITHMS else [name])]
-    parts = [line for algorithm in algorithms for line in _describe_algorithm(algorithm)]
+    parts = list(_describe_algorithm(algorithms[0]))
+    if name == ALGORITHMS:
+        titles = [(algorithm.name, algorithm.title) for algorithm in algorithms]
+        parts = [Rows("Algorithms", ("name", "description"), titles), "settings and source: nlp-gait list NAME"]
     return Output(data={"algorithms": [asdict(algorithm) for algorithm in algorithms]}, parts=parts)
+
+
+def _list_limits() -> Output:
+    from nlp_gait.limits import LIMITS
+
+    header = ("name", "description", "parameters")
+    rows = [
+        (name, str(limit.__doc__).splitlines()[0], ", ".join(f"{q.name}={q.default:g}" for q in limit.parameters))
+        for name, limit in LIMITS.items()
+    ]
+    data = [dict(zip(header, row, strict=True)) for row in rows]
+    return Output(data={"limits": data}, parts=[Rows("Limits, for --limit", header, rows)])
 
 
 def _describe_algorithm(algorithm: Description) -> Iterator[str | Rows]:
@@ -99,10 +115,8 @@ def _list_all() -> Output:
     rows = [(name, title, str(n), str(p)) for name, (title, n, p) in listed["problems"].items()]
     parts: list[str | Rows] = [
         Rows("Problems", ("name", "description", "variables", "parameters"), rows),
-        f"algorithms: {', '.join(listed['algorithms'])}",
-        f"for several objectives (pareto): {', '.join(listed['fronts'])}",
         f"robots: {', '.join(listed['robots'])}",
-        f"limits of gaits, for --limit: {', '.join(LIMITS)}",
+        "algorithms: nlp-gait list algorithms; limits of gaits, for --limit: nlp-gait list limits",
     ]
     for kind, packages in installed.items():
         names = ", ".join(f"{name} ({value})" for name, value in packages.items())

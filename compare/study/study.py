@@ -58,7 +58,7 @@ def read_study_file(folder: Path) -> StudyFile:
         return decode(StudyFile, raw)
 
 
-def list_runs(folder: Path, names: Sequence[str], command: str = "") -> None:
+def add_runs(folder: Path, names: Sequence[str], command: str = "") -> None:
     """Make runs part of a study; they replace the runs of their problems and solvers, whose records stay as files.
 
     A command is written, too. Raises InputError if ``study.json`` is damaged, and OutputError.
@@ -101,9 +101,9 @@ def write_record(record: RunRecord, folder: Path) -> Path:
 
 
 def write_records(records: Sequence[RunRecord], folder: Path) -> list[Path]:
-    """Write records to a study's folder, make them part of the study, and return their files; raises as ``list_runs``."""
+    """Write records to a study's folder, make them part of the study, and return their files; raises as ``add_runs``."""
     paths = [write_record(record, make_writable_folder(folder)) for record in records]
-    list_runs(folder, [name_record(record) for record in records])
+    add_runs(folder, [name_record(record) for record in records])
     return paths
 
 
@@ -233,7 +233,7 @@ def _read_finished(study: Study, inputs: Sequence[Inputs]) -> dict[int, RunRecor
     paths = [study.folder / RECORDS / f"{name}.json" for name in names]
     for folder in {path.parent for path in paths}:
         make_writable_folder(folder)
-    list_runs(study.folder, names, study.command)
+    add_runs(study.folder, names, study.command)
     return {index: _read_named(path) for index, path in enumerate(paths) if path.exists()}
 
 

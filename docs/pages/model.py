@@ -13,6 +13,7 @@ from docs.pages.markdown import code, page, table, write_all
 from docs.pages.problems import names
 from nlp_gait.backends.nlp import WIDTHS
 from nlp_gait.formulation import load
+from nlp_gait.gaits.biped.limits import GOALS
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.leg_network import ONLINE, PRINTED
 from nlp_gait.robots import load_robot
@@ -26,7 +27,13 @@ BLUE, ORANGE = "#0072B2", "#D55E00"
 def write(folder: Path) -> None:
     """Write drawings and tables."""
     own = folder / "model"
-    write_all(own, {"counts.md": count_constraints(), "levels.md": list_levels(), "stairs.md": list_stair_constants()})
+    pages = {
+        "counts": count_constraints,
+        "levels": list_levels,
+        "objectives": list_objectives,
+        "stairs": list_stair_constants,
+    }
+    write_all(own, {f"{name}.md": make() for name, make in pages.items()})
     for name, drawing in (("sole", draw_sole()), ("smoothed-margin", draw_smoothed_margin())):
         (own / f"{name}.svg").write_text(render_svg(drawing), encoding="utf-8")
 
@@ -69,6 +76,16 @@ def list_levels() -> str:
         for row in measured
     ]
     return page(table(header, rows))
+
+
+def list_objectives() -> str:
+    """Return the formulas of all objectives of a phase but power."""
+    rows = [
+        (code(f"objective={name}"), f"${goal.formula}$", goal.objective.unit)
+        for name, goal in GOALS.items()
+        if goal.formula
+    ]
+    return page(table(("option", "formula", "unit"), rows))
 
 
 def list_stair_constants() -> str:

@@ -26,7 +26,7 @@ from nlp_gait.gaitbench import load
 from nlp_gait.gaitbench.c_export import export_objective, make_prefix
 from nlp_gait.gaitbench.instance import Instance
 from nlp_gait.gaits.biped.body import Support
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, Goal
+from nlp_gait.gaits.biped.limits import GOALS, REACH_MARGIN
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import ON_GROUND, list_limbs, make_level_sole, place_links
 from nlp_gait.gaits.biped.problems import GridOptions
@@ -147,7 +147,7 @@ def make_phase(instance: Instance) -> Phase:
     options = instance.definition.options
     body = make_nao(str(options["robot"]))
     step_m, grid = float(options["step_length_m"]), GridOptions().make_grid()
-    return make_support_phase(body, Support.SINGLE, step_m, "cubic", grid, Goal())
+    return make_support_phase(body, Support.SINGLE, step_m, "cubic", grid, GOALS["power"])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -69,10 +69,11 @@ def split_names(text: str) -> list[tuple[str, str]]:
 
 
 def _load_limit(name: str) -> Any:
-    if name in LIMITS:
-        return import_object(LIMITS[name])()
+    shipped = import_object(LIMITS)
+    if name in shipped:
+        return shipped[name]()
     if not user_code.is_user_code(name, "limit"):
-        raise unknown("limit", name, [*LIMITS, *user_code.find_entry_points("limit")])
+        raise unknown("limit", name, [*shipped, *user_code.find_entry_points("limit")])
     user_code.allow_code(name)
     loaded: Any = user_code.load_object(name, "limit")
     limit = user_code.call_user_code(name, loaded) if isinstance(loaded, type) else loaded

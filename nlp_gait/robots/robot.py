@@ -89,19 +89,16 @@ class Link:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motor:
-    """Motor and gear of a joint (data-sheet values at the motor shaft), and the rotor's inertia if known."""
+    """Motor and gear of a joint, with the torques of its data sheet at the motor's shaft."""
 
     make: str
     gear_ratio: float
-    no_load_rpm: float
     stall_torque_mNm: float
     continuous_torque_mNm: float
-    rotor_inertia_gcm2: float | None = None
 
     def __post_init__(self) -> None:
-        ratings = ["gear_ratio", "no_load_rpm", "stall_torque_mNm", "continuous_torque_mNm"]
-        positive = ratings if self.rotor_inertia_gcm2 is None else [*ratings, "rotor_inertia_gcm2"]
-        check_numbers(f"motor {self.make!r}", self, positive=positive)
+        positive = ("gear_ratio", "stall_torque_mNm", "continuous_torque_mNm")
+        check_numbers(f"motor {self.make!r}", self, positive)
 
     @property
     def stall_torque_Nm(self) -> float:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -126,8 +126,6 @@ def interpolate_states(
 
 SPEED = "speed_m_s"
 SPEED_M_S = 0.03  # default, of NAO
-# Energy per metre leaves the speed free; the others are means over the time of a cycle at a given speed.
-CycleObjective = Literal["energy-per-metre", "power", "torque"]
 LEAST_SPEED = 1e-4  # [m/s]
 NO_JUMP_LIMIT = 1000.0  # of NAO [Nm]
 

@@ -14,7 +14,7 @@ from nlp_gait.errors import unknown
 from nlp_gait.formulation import Constraint, InstantPoint, Objective, Over, Parameter, Point
 from nlp_gait.formulation.assembly import make_labels
 from nlp_gait.formulation.assembly import make_parameters as table
-from nlp_gait.gaits.biped.samples import BOTH_FEET, CORNERS, Quantity, Samples
+from nlp_gait.gaits.biped.samples import Quantity, Samples
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -23,7 +23,6 @@ SCALES = {"rad": 1.0, "rad/s": 1.0, "Nm": 1.0, "N": 10.0, "m": 0.01, "1": 1.0, "
 REACH_MARGIN = "reach_margin"
 TORQUE_CHANGE_NM = 1.2  # of NAO, over one interval
 LEGS = ("left leg", "right leg")
-SMOOTH_N = 1e-6  # [N]; smaller forces are rounding
 CLOSURE_M = 1e-9  # by which a leg may miss its foot: far below what matters, far above rounding
 
 Side = TypeVar("Side", float, MX)
@@ -261,61 +260,6 @@ def make_halfway_rows(
     )
 
 
-class FrictionCone(Limit):
-    """Tangential force of each standing sole within the friction coefficient times its normal force.
-
-    The tangential force is sqrt(f_x^2 + f_y^2 + e^2) with e = 1e-6 N, which is smooth where the force vanishes. Indexes: the
-    friction that the gait needs, its largest ratio of tangential to normal force.
-
-    Source:
-        Kajita, Hirukawa, Harada, Yokoi (2014), "Introduction to Humanoid Robotics", section 3.2: a foot does not slip while the
-        ground's force is within the cone of Coulomb's friction.
-    """
-
-    reads = (Samples.wrench_left, Samples.wrench_right)
-    parameters = table(("friction_coefficient", "1", 0.6, "of both soles on the ground", 0.0, math.inf))
-
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        rows, ratios = [], []
-        for side in samples.standing:
-            force = samples.wrench(side)[:3, :]
-            tangential = ca.sqrt(force[0, :] ** 2 + force[1, :] ** 2 + SMOOTH_N**2)
-            slack = point["friction_coefficient"] * force[2, :] - tangential
-            rows.append(make_rows_at_samples("friction", "N", slack, (BOTH_FEET[side],), MX(0.0)))
-            ratios.append(ca.mmax(tangential / ca.fmax(force[2, :], SMOOTH_N)))
-        return rows, {
-            f"{BOTH_FEET[side]}_friction": ratio for side, ratio in zip(samples.standing, ratios, strict=True)
-        }
-
-
-class FootClearance(Limit):
-    """Sole of the swinging foot above the ground by at least h(s) = 16 c s^2 (1 - s)^2, where s is the share of the swing's time.
-
-    It vanishes with its slope at both ends, and is the clearance c in the middle. Heights are above the standing sole: of a flat
-    sole, or of the four corners of one that may tilt. A phase in which both feet stand has no rows of it.
-
-    Source:
-        This package's own; c is a parameter. That toes need clearance in mid-swing: Winter (1992), "Foot trajectory in human
-        gait", Physical Therapy 72(1).
-    """
-
-    reads = (Samples.swing_heights,)
-    parameters = table(
-        ("foot_clearance_m", "m", 0.01, "of the swinging sole in the middle of its swing", 0.0, math.inf)
-    )
-
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        if len(samples.standing) > 1:
-            return [], {}
-        s, heights = samples.progress[1:-1], samples.swing_heights[:, 1:-1]
-        points = CORNERS if heights.shape[0] > 1 else ("sole",)
-        needed = point["foot_clearance_m"] * 16 * s**2 * (1 - s) ** 2
-        above = heights - ca.repmat(needed, len(points), 1)
-        return [make_rows_at_samples("foot_clearance", "m", above, points, MX(0.0), first=1)], {
-            "foot_clearance_m": ca.mmax(samples.swing_heights)
-        }
-
-
 POWER = Objective(name="power", unit="W")
 HEAT_LOSS = Parameter(
     name="heat_loss_W_per_Nm2", unit="W/(Nm)^2", default=0.025, description="K, heat loss (eq. 32)", minimum=0.0
@@ -330,39 +274,42 @@ def compute_paper_power(point: Point, samples: Samples, ops: Nonsmooth) -> MX:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Goal:
-    """What is minimised: mean power, or another figure of the samples with power as an index."""
+    """What a phase minimises: a function of its samples."""
 
-    objective: Objective = POWER  # name and unit
-    figure: Callable[[Samples, Nonsmooth], MX] | None = None  # of the samples; None for power
+    objective: Objective  # its name and unit
+    compute: Callable[[Point, Samples, Nonsmooth], MX]
+    formula: str = ""  # of ``docs/model/power.md``
     reads: tuple[Quantity, ...] = ()  # see ``Limit.reads``
 
     def evaluate(self, point: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX]]:
         """Return the objective and the indexes: power, and what is minimised instead."""
-        if self.figure is None:
-            power = compute_paper_power(point, samples, ops)
-            return power, {"power_W": power}
-        figure = self.figure(samples, ops)
-        return figure, {"power_W": compute_paper_power(point, samples, Exact()), self.objective.name: figure}
+        value = self.compute(point, samples, ops)
+        if self.objective is POWER:
+            return value, {"power_W": value}
+        return value, {"power_W": compute_paper_power(point, samples, Exact()), self.objective.name: value}
 
 
 def _average_squared_rate(values: MX, samples: Samples) -> MX:
     return ca.sumsqr(values[:, 1:] - values[:, :-1]) / samples.step_s**2 / samples.steps
 
 
-Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
-GOALS = {
-    "power": Goal(),
+GoalName = Literal["power", "jerk", "torque", "torque-smoothness"]
+GOALS: Mapping[GoalName, Goal] = {
+    "power": Goal(objective=POWER, compute=compute_paper_power),
     "jerk": Goal(
         objective=Objective(name="joint_jerk", unit="rad^2/s^6"),
-        figure=lambda samples, ops: _average_squared_rate(samples.qdd, samples),
+        compute=lambda point, samples, ops: _average_squared_rate(samples.qdd, samples),
+        formula=r"\frac{1}{N} \sum_{k=1}^{N} \sum_j \left( \frac{\ddot{q}_{j,k} - \ddot{q}_{j,k-1}}{h} \right)^2",
         reads=(Samples.qdd,),
     ),
     "torque": Goal(
         objective=Objective(name="squared_torque", unit="(Nm)^2"),
-        figure=lambda samples, ops: samples.average(ca.sum1(samples.torque**2)),
+        compute=lambda point, samples, ops: samples.average(ca.sum1(samples.torque**2)),
+        formula=r"\overline{\sum_j \tau_j^2}",
     ),
     "torque-smoothness": Goal(
         objective=Objective(name="torque_rate", unit="(Nm/s)^2"),
-        figure=lambda samples, ops: _average_squared_rate(samples.torque, samples),
+        compute=lambda point, samples, ops: _average_squared_rate(samples.torque, samples),
+        formula=r"\frac{1}{N} \sum_{k=1}^{N} \sum_j \left( \frac{\tau_{j,k} - \tau_{j,k-1}}{h} \right)^2",
     ),
 }

@@ -24,7 +24,7 @@ from nlp_gait.formulation.assembly import Point, RowsOverTime, Variable
 from nlp_gait.formulation.display import SIMULATED
 from nlp_gait.formulation.gait_problem import Start
 from nlp_gait.gaits.biped.body import Body
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, Goal, Limit
+from nlp_gait.gaits.biped.limits import GOALS, REACH_MARGIN, Goal, Limit
 from nlp_gait.gaits.biped.samples import (
     BOTH_FEET,
     LEAST_DURATION,
@@ -85,7 +85,7 @@ class Phase:
     grid: Grid  # its samples
     derivatives: Derivatives = "analytic"  # analytic ones, or finite differences of the sampled angles as in the paper
     limits: Sequence[Limit] = ()  # they add the rows
-    goal: Goal = Goal()  # what it minimises
+    goal: Goal = GOALS["power"]  # what it minimises
     standing: tuple[str, ...] = ("L", "R")  # sides of the feet on the ground
     kinks: tuple[float, ...] = ()  # phases at which the motion's formula changes: knots of splines
     start: Start | None = None  # start points; None for any within the bounds

@@ -1,15 +1,16 @@
 """Options of the problems of bipeds, each declared and explained once, and how phases, cycles and walks are made of them."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Grid
 from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.gaits.biped.body import Body, Support
 from nlp_gait.gaits.biped.curves import Trajectory
-from nlp_gait.gaits.biped.cycle import CycleObjective, make_cycle_problem, make_walking_cycle
+from nlp_gait.gaits.biped.cycle import make_cycle_problem, make_walking_cycle
 from nlp_gait.gaits.biped.footholds import Flight, parse_footholds
-from nlp_gait.gaits.biped.limits import GOALS, Criterion
+from nlp_gait.gaits.biped.limits import GOALS, GoalName
 from nlp_gait.gaits.biped.loads import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.phase_problem import make_phase_problem
@@ -25,7 +26,7 @@ class RobotOptions:
 
     Attributes:
         robot: name of the robot, or its file: URDF, MJCF or JSON
-        limits: more limits of every phase, separated by commas: those that ``nlp-gait list`` names, or your own, FILE.py:NAME
+        limits: more limits of every phase, separated by commas: of ``nlp-gait list limits``, or your own, FILE.py:NAME
     """
 
     robot: str = "nao-v5"
@@ -69,10 +70,10 @@ class PhaseOptions(StepOptions, GridOptions):
     """A phase as in the paper.
 
     Attributes:
-        objective: what is minimised: power as in the paper, joint jerk, torques, or their rate
+        objective: what is minimised, a mean over the phase; power is the paper's
     """
 
-    objective: Criterion = "power"
+    objective: GoalName = "power"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,11 +106,11 @@ class CycleOptions(GridOptions, LoadOptions):
     """One step, whose mirror image is the next one.
 
     Attributes:
-        objective: what is minimised: energy per metre, which leaves the speed free; or power, or torque, the mean of the sum of
-            squared torques, at the speed ``speed_m_s``, a parameter: the step length is then speed times the time of the cycle
+        objective: what is minimised: energy per metre, which leaves the speed free; or a mean over the cycle, as of a phase, at
+            the speed ``speed_m_s``, a parameter: the step length is then speed times the time of the cycle
     """
 
-    objective: CycleObjective = "energy-per-metre"
+    objective: Literal["energy-per-metre", GoalName] = "energy-per-metre"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +133,7 @@ class WalkOptions(GridOptions):
 
 def plan_cycle(body: Body, options: CycleOptions) -> GaitProblem:
     """Return the problem of a cycle."""
-    goal = GOALS["torque" if options.objective == "torque" else "power"]
+    goal = GOALS["power" if options.objective == "energy-per-metre" else options.objective]
     cycle = make_walking_cycle(
         body,
         make_divided_loads(body, options.torso_share),

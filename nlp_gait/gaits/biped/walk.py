@@ -20,7 +20,7 @@ from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter,
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body, Support, make_lift_variable
 from nlp_gait.gaits.biped.cycle import STEP, PhaseMotion, make_cycle_margins, make_planner
 from nlp_gait.gaits.biped.footholds import Flight, Foothold, list_feet
-from nlp_gait.gaits.biped.limits import BalanceMargins, Goal, RowsAndIndexes
+from nlp_gait.gaits.biped.limits import BalanceMargins, RowsAndIndexes
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase
@@ -266,14 +266,11 @@ def _make_walk(
     turning, equal = any(foothold.yaw for foothold in footholds), right != RIGHT
     loads = make_divided_loads(body, "lever")
     body = replace(body, upright=frozenset()) if turning else body  # a swinging foot turns
-    goal, box = (
-        Goal(),
-        make_support_box(body.robot, {side: (0.0, body.ankle(side)[0]) for side in "LR"}),
-    )
+    box = make_support_box(body.robot, {side: (0.0, body.ankle(side)[0]) for side in "LR"})
     plans = [make_walk_planner(body, right, swings=swings, turning=turning, flight=flight) for swings in (False, True)]
     fields: dict[str, Any] = {"variables": make_phase_variables(body, right), "duration": DURATION, "grid": grid}
     phases = {
-        kind: make_phase(body, kind, balance, loads, plan=plans[kind is Support.SINGLE], goal=goal, **fields)
+        kind: make_phase(body, kind, balance, loads, plan=plans[kind is Support.SINGLE], **fields)
         for kind, balance in {**margins, Support.STAND: limit_to_box(box)}.items()
     }
     sections = list_sections(footholds, body.feet_y, equal=equal)

@@ -4,20 +4,18 @@ import json
 from importlib.resources import files
 from typing import Any
 
-from compare.study.run import list_solvers
-from metaheuristics.multi_objective import FRONT_ALGORITHMS
+from compare.report.provenance import list_described_names
 from nlp_gait import formulation
+from nlp_gait.limits import LIMITS
 from nlp_gait.robots import list_robots
 from tests.compare.cli.calls import as_json, nlp_gait
 
 
 def collect_names() -> dict[str, Any]:
-    """Return what `listed.json` has: problems with title and numbers of variables and parameters, and all other names."""
+    """Return what `listed.json` has: problems with title and numbers of variables and parameters, and robots."""
     problems = {name: formulation.load(name) for name in formulation.list_problems()}
     return {
         "problems": {name: [p.title, len(p.names), len(p.own_parameters)] for name, p in problems.items()},
-        "algorithms": list(list_solvers()),
-        "fronts": list(FRONT_ALGORITHMS),
         "robots": list(list_robots()),
     }
 
@@ -27,10 +25,14 @@ def test_the_shipped_list_is_that_of_the_code() -> None:
     assert shipped == collect_names(), "python -m tests.compare.cli.test_listed > compare/cli/listed.json"
 
 
-def test_the_list_names_problems_algorithms_and_robots() -> None:
+def test_the_lists_name_problems_algorithms_robots_and_limits() -> None:
     text = nlp_gait("list").stdout
-    assert "NAO on one leg: mean motor power" in text and "pymoo:" in text and "nao-v5" in text
+    assert "NAO on one leg: mean motor power" in text and "nao-v5" in text
     assert as_json("list")["problems"]["nao-ssp"]["variables"] == 9
+    assert [found["name"] for found in as_json("list", "algorithms")["algorithms"]] == list(list_described_names())
+    assert " pymoo:GA " in nlp_gait("list", "algorithms").stdout
+    limits = {found["name"]: found["parameters"] for found in as_json("list", "limits")["limits"]}
+    assert limits.keys() == LIMITS.keys() and limits["FrictionCone"] == "friction_coefficient=0.6"
 
 
 if __name__ == "__main__":

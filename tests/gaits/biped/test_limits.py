@@ -1,7 +1,7 @@
 """Rows of limits and places of soles by hand, on samples small enough to check on paper."""
 
 from dataclasses import replace
-from types import SimpleNamespace
+from typing import get_args
 
 import casadi as ca
 import numpy as np
@@ -11,25 +11,42 @@ from casadi import DM, MX
 from nlp_gait.formulation import Grid
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.footholds import Flight
-from nlp_gait.gaits.biped.limits import GOALS, TorqueChange, compute_margins
+from nlp_gait.gaits.biped.limits import GOALS, GoalName, TorqueChange, compute_margins
 from nlp_gait.gaits.biped.phase_problem import make_level_sole
+from nlp_gait.gaits.biped.samples import Samples
 from nlp_gait.gaits.biped.support_phases import make_support_box
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.robots import load_robot
 from nlp_gait.symbolic.nonsmooth import Exact
 
+# [Nm], [W] and [rad/s^2] of two joints at five samples.
 TORQUE = np.array([[0.0, 1.0, 3.0, 6.0, 10.0], [5.0, 4.0, 2.0, 2.0, 1.0]])
+POWER_W = np.array([[1.0, -2.0, 3.0, -4.0, 5.0], [0.0, 0.0, 0.0, 0.0, 0.0]])
+ACCELERATION = np.array([[0.0, 1.0, 3.0, 6.0, 10.0], [2.0, 2.0, 2.0, 2.0, 2.0]])
+# Of these samples, by hand: means by the trapezoidal rule, squared differences over 0.25 s.
+OBJECTIVES = {
+    "power": 3.0 + 0.1 * 33.25,
+    "jerk": (1 + 4 + 9 + 16) * 16 / 4,
+    "torque": (25 / 2 + 17 + 13 + 40 + 101 / 2) / 4,
+    "torque-smoothness": (1 + 4 + 9 + 16 + 1 + 4 + 0 + 1) * 16 / 4,
+}
 
 
 def numbers(value: MX) -> np.ndarray:
     return np.array(ca.evalf(value)).ravel()
 
 
-def make_samples() -> SimpleNamespace:
-    """Two joints at five samples, two for each of two intervals."""
-    grid = Grid(intervals=2, samples_per_interval=2)
-    return SimpleNamespace(
-        grid=grid, joints=("a", "b"), torque=MX(DM(TORQUE)), average=lambda values: values @ DM(grid.weights)
+def make_samples() -> Samples:
+    """Two joints at five samples of a second, two for each of two intervals."""
+    values = {Samples.torque: TORQUE, Samples.power: POWER_W, Samples.qdd: ACCELERATION}
+    return Samples(
+        joints=("a", "b"),
+        moving=("a", "b"),
+        standing=("L",),
+        grid=Grid(intervals=2, samples_per_interval=2),
+        duration=MX(1.0),
+        progress=MX(DM(np.linspace(0.0, 1.0, 5)).T),
+        evaluate=lambda quantity: MX(DM(values[quantity])),
     )
 
 
@@ -40,11 +57,14 @@ def test_a_torque_changes_over_an_interval_not_over_a_sample() -> None:
     assert numbers(indexes["torque_change_Nm"]) == pytest.approx([7.0])
 
 
-def test_the_goal_torque_is_the_mean_sum_of_squared_torques() -> None:
-    figure = GOALS["torque"].figure
-    assert figure is not None
-    squares = (TORQUE**2).sum(axis=0)  # trapezoid: half the weight at both ends
-    assert numbers(figure(make_samples(), Exact())) == pytest.approx([(squares.sum() - squares[[0, -1]].mean()) / 4])
+@pytest.mark.parametrize("name", GOALS)
+def test_every_goal_by_hand(name: GoalName) -> None:
+    assert set(OBJECTIVES) == set(GOALS) == set(get_args(GoalName)), (
+        "add the goal to GoalName, and its value to OBJECTIVES"
+    )
+    objective, indexes = GOALS[name].evaluate({"heat_loss_W_per_Nm2": MX(0.1)}, make_samples(), Exact())
+    assert numbers(objective) == pytest.approx([OBJECTIVES[name]])
+    assert numbers(indexes["power_W"]) == pytest.approx([OBJECTIVES["power"]])
 
 
 def test_margins_are_distances_to_the_edges_of_a_sole_that_is_not_symmetric() -> None:

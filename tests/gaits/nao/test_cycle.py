@@ -8,7 +8,7 @@ from scipy.integrate import trapezoid
 
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.biped.cycle import make_walking_cycle
-from nlp_gait.gaits.biped.limits import Goal
+from nlp_gait.gaits.biped.limits import GOALS
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.robots import load_robot
@@ -54,7 +54,7 @@ def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
     loads = make_divided_loads(body, problem.options["torso_share"])  # type: ignore[arg-type]
     assert problem.grid is not None
     cycle = make_walking_cycle(
-        body, loads, problem.grid, Goal(), at_given_speed=problem.options["objective"] == "power"
+        body, loads, problem.grid, GOALS["power"], at_given_speed=problem.options["objective"] == "power"
     )
     at = cycle.read_section(cycle.sections[0], problem.at(x))
     single, double = (phase.signals(at) for phase in cycle.phases.values())
