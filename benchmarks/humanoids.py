@@ -116,15 +116,15 @@ def plan(name: str, folder: Path, row: Row) -> Row:
     walk.save(find_plan(folder, name))
     problem, robot = walk.solution.problem, walk.solution.problem.display.robot
     assert robot is not None
-    indexes = build_exact_model(problem).at(walk.solution.best.x, problem.p).indexes
+    metrics = build_exact_model(problem).at(walk.solution.best.x, problem.p).metrics
     return {
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
         "energy_J_per_m": walk.energy_J / walk.distance_m,
-        "speed_m_s": float(indexes["speed_m_s"]) if "speed_m_s" in indexes else None,  # None if the steps differ
+        "speed_m_s": float(metrics["speed_m_s"]) if "speed_m_s" in metrics else None,  # None if the steps differ
         "distance_m": walk.distance_m,
         "margins_m": [
-            min(float(value) for name, value in indexes.items() if name.endswith(f"ssp_dbm_{axis}_min_m"))
+            min(float(value) for name, value in metrics.items() if name.endswith(f"ssp_dbm_{axis}_min_m"))
             for axis in "xy"
         ],
         "active_margins": list(walk.active_margins),

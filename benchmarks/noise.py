@@ -30,7 +30,7 @@ def main() -> None:
     print(header("cycle", "ms between rows", "noise [mrad]", "power", "touch-down [ms]"))
     for label, x in (("middle of the bounds", middle), ("optimum", optimum)):
         result = Result(problem=problem, x=x)
-        power, touch_down = evaluate(problem, x, prove=False).indexes["power_W"], x[single]
+        power, touch_down = evaluate(problem, x, prove=False).metrics["power_W"], x[single]
         for period_ms in (10, 20):
             with TemporaryDirectory() as folder:
                 path = Path(folder) / "cycle.csv"
@@ -41,7 +41,7 @@ def main() -> None:
                 for seed in range(SEEDS):
                     noise = np.random.default_rng(seed).normal(0.0, noise_rad, angles.q.shape)
                     gait = make_recorded_gait(replace(angles, q=angles.q + noise))
-                    found = evaluate(gait.problem, np.array(gait.x), prove=False).indexes["power_W"]
+                    found = evaluate(gait.problem, np.array(gait.x), prove=False).metrics["power_W"]
                     errors.append(100.0 * (found / power - 1.0))
                     late.append(1e3 * (gait.x[0] - touch_down))
                 row = (f"{min(errors):+.1f} to {max(errors):+.1f} %", f"{min(late):+.0f} to {max(late):+.0f}")

@@ -30,11 +30,11 @@ class Evaluation:
     parameters: Mapping[str, float]  #: values that differ from the defaults
     x: Mapping[str, float]  #: by variable name
     objective: Mapping[str, Any]  #: name, value and unit
-    indexes: Mapping[str, float]  #: performance figures at the problem's samples
+    metrics: Mapping[str, float]  #: performance figures at the problem's samples
     constraints: tuple[ConstraintValue, ...]  #: all rows, the variables' bounds last
     violation: float  #: total over all rows, each divided by its scale
     feasible: bool  #: total violation at most 1e-6
-    dense: Mapping[str, float] | None  #: the same indexes on the dense grid; None for a problem without samples
+    dense: Mapping[str, float] | None  #: the same metrics on the dense grid; None for a problem without samples
     #: Rows violated on the dense grid, worst first; times are samples of that grid
     dense_violations: tuple[ConstraintValue, ...]
     dense_intervals: int | None  #: number of intervals of the dense grid
@@ -77,11 +77,11 @@ def evaluate(
         parameters=dict(problem.values),
         x=problem.by_name(point),
         objective={"name": objective.name, "value": objective.sign * values.cost, "unit": objective.unit},
-        indexes=values.indexes,
+        metrics=values.metrics,
         constraints=exact.rows(values),
         violation=values.violation,
         feasible=values.violation <= FEASIBILITY_TOLERANCE,
-        dense=None if dense_values is None else dense_values.indexes,
+        dense=None if dense_values is None else dense_values.metrics,
         dense_violations=()
         if dense is None or dense_values is None
         else build_exact_model(dense).find_violated(dense_values),

@@ -74,7 +74,7 @@ def two_link(*, intervals: int = 20, lift_m: float = 0.05) -> GaitProblem:
                        value=4 * LENGTH * ca.sin(at["swing_rad"]) / at["time_s"]),
         )  # fmt: skip
         return Assembly(
-            objective=power, constraints=rows, indexes={"power_W": power, "lift_m": clearance(q)[intervals // 2]}
+            objective=power, constraints=rows, metrics={"power_W": power, "lift_m": clearance(q)[intervals // 2]}
         )
 
     def signals(at: NumericPoint) -> Signals:

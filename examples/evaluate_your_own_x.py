@@ -16,7 +16,7 @@ problem = nlp_gait.load("nao-ssp", robot="nao-v5")
 verdict = evaluate(problem, x)
 objective = verdict.objective
 print(f"{objective['name']} {objective['value']:.6f} {objective['unit']}, feasible: {verdict.feasible}")
-for name, value in verdict.indexes.items():
+for name, value in verdict.metrics.items():
     print(f"  {name}: {value:.6f} on its samples, {verdict.dense[name]:.6f} on {verdict.dense_intervals} intervals")
 
 # %%

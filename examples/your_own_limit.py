@@ -23,7 +23,7 @@ class HipPitchRate(Limit):
     parameters = make_parameters(("hip_pitch_rate_limit_rad_s", "rad/s", 3.0, "largest rate of hip pitch", 0.0, 100.0))
 
     def add(self, point, samples, ops):
-        """Return the rows, and performance indexes by name."""
+        """Return the rows, and metrics by name."""
         limit = point["hip_pitch_rate_limit_rad_s"]
         rates = samples.qd[[samples.moving.index(joint) for joint in HIPS], :]
         return [make_rows_at_samples("hip_pitch_rate", "rad/s", rates, HIPS, -limit, limit)], {}

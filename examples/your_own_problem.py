@@ -51,7 +51,7 @@ def assemble(at, ops):
         Constraint(name="clearance", labels=labels, unit="m", scale=0.01, value=height, lower=MX(0.005)),
         Constraint(name="speed", unit="m/s", scale=0.1, value=speed, lower=at["speed_m_s"]),
     )
-    return Assembly(objective=power, constraints=rows, indexes={"speed_m_s": speed})
+    return Assembly(objective=power, constraints=rows, metrics={"speed_m_s": speed})
 
 
 # %%

@@ -12,7 +12,7 @@ from casadi import MX
 
 from nlp_gait.formulation import Constraint, Parameter, Point
 from nlp_gait.formulation.assembly import make_parameters
-from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_rows_at_samples
+from nlp_gait.gaits.biped.limits import Limit, RowsAndMetrics, make_rows, make_rows_at_samples
 from nlp_gait.gaits.biped.samples import BOTH_FEET, CORNERS, Samples
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -22,7 +22,7 @@ SMOOTH_N = 1e-6  # [N]; smaller forces are rounding
 class FrictionCone(Limit):
     """Tangential force of each standing sole within the friction coefficient times its normal force.
 
-    The tangential force is sqrt(f_x^2 + f_y^2 + e^2) with e = 1e-6 N, which is smooth where the force vanishes. Indexes: the
+    The tangential force is sqrt(f_x^2 + f_y^2 + e^2) with e = 1e-6 N, which is smooth where the force vanishes. Metrics: the
     friction that the gait needs, its largest ratio of tangential to normal force.
 
     Source:
@@ -33,7 +33,7 @@ class FrictionCone(Limit):
     reads = (Samples.wrench_left, Samples.wrench_right)
     parameters = make_parameters(("friction_coefficient", "1", 0.6, "of both soles on the ground", 0.0, math.inf))
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         rows, ratios = [], []
         for side in samples.standing:
             force = samples.wrench(side)[:3, :]
@@ -62,7 +62,7 @@ class FootClearance(Limit):
         ("foot_clearance_m", "m", 0.01, "of the swinging sole in the middle of its swing", 0.0, math.inf)
     )
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         if len(samples.standing) > 1:
             return [], {}
         s, heights = samples.progress[1:-1], samples.swing_heights[:, 1:-1]
@@ -83,7 +83,7 @@ __all__ = [
     "Nonsmooth",
     "Parameter",
     "Point",
-    "RowsAndIndexes",
+    "RowsAndMetrics",
     "Samples",
     "make_parameters",
     "make_rows",

@@ -16,7 +16,7 @@ class Evaluation:
     g: Array  #: (m,) values of the rows, between lower and upper (m,) where they hold
     lower: Array
     upper: Array
-    indexes: Mapping[str, float]  #: by name
+    metrics: Mapping[str, float]  #: by name
     row_names: tuple[str, ...]  #: (m,)
 
     @property

@@ -65,15 +65,15 @@ def test_every_limit_has_rows_in_every_kind_of_phase(problems: Callable[[str], G
 
 
 def evaluate_rows(limit: Limit, values: dict[Any, MX], **samples: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return values (m,) of a limit's rows and its indexes on samples by hand."""
+    """Return values (m,) of a limit's rows and its metrics on samples by hand."""
     found = Samples(
         joints=(), moving=(), duration=MX(1.0), grid=Grid(intervals=4), evaluate=values.__getitem__, **samples
     )
     names = [parameter.name for parameter in limit.parameters]
     at = Point.of(MX(0, 1), MX(DM([parameter.default for parameter in limit.parameters])), (), names)
-    rows, indexes = limit.add(at, found, Exact())
+    rows, metrics = limit.add(at, found, Exact())
     found_values = [np.array(ca.evalf(row.value)).ravel() for row in rows]
-    return np.concatenate(found_values or [np.zeros(0)]), np.array([float(ca.evalf(v)) for v in indexes.values()])
+    return np.concatenate(found_values or [np.zeros(0)]), np.array([float(ca.evalf(v)) for v in metrics.values()])
 
 
 def test_friction_by_hand() -> None:

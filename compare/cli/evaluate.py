@@ -117,12 +117,12 @@ def _tabulate(judged: Sequence[Evaluation]) -> Rows:
 def _list_cells(judged: Sequence[Evaluation]) -> Iterator[Sequence[object]]:
     """Yield heading and rows of a CSV file."""
     name = judged[0].objective["name"]
-    indexes = [index for index in judged[0].indexes if index != name]
-    yield [*judged[0].x, name, "violation", "feasible", "feasible_between_samples", "guaranteed", *indexes]
+    metrics = [metric for metric in judged[0].metrics if metric != name]
+    yield [*judged[0].x, name, "violation", "feasible", "feasible_between_samples", "guaranteed", *metrics]
     for e in judged:
         proven = "" if e.guaranteed is None or e.guaranteed.satisfied is None else e.guaranteed.satisfied
         between = "" if e.dense is None else not e.dense_violations
-        values = (e.indexes[index] for index in indexes)
+        values = (e.metrics[metric] for metric in metrics)
         yield [*e.x.values(), e.objective["value"], e.violation, e.feasible, between, proven, *values]
 
 
@@ -130,7 +130,7 @@ def _describe(evaluation: Evaluation) -> Iterator[str | Rows]:
     objective, dense, guaranteed = evaluation.objective, evaluation.dense, evaluation.guaranteed
     yield f"{evaluation.problem}: {objective['name']} {with_unit(objective['value'], objective['unit'])}"
     header = ["index", "value" if dense is None else "samples"]
-    rows = [[name, f"{value:z.6f}"] for name, value in evaluation.indexes.items()]
+    rows = [[name, f"{value:z.6f}"] for name, value in evaluation.metrics.items()]
     if dense is not None:
         header.append(f"{evaluation.dense_intervals} intervals")
         rows = [[*row, with_unit(dense.get(row[0]), "1")] for row in rows]

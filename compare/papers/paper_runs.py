@@ -113,10 +113,10 @@ def _build(name: str | GaitProblem, options: tuple[tuple[str, Any], ...]) -> tup
 
 
 def evaluate_point(spec: ProblemSpec, x: Sequence[float]) -> Mapping[str, float]:
-    """Return objective and performance indexes at x (n,) by the exact functions, which are built once for equal options."""
+    """Return objective and metrics at x (n,) by the exact functions, which are built once for equal options."""
     problem, model = _build(spec.name, tuple(sorted(spec.options.items())))
     point = model.at(problem.check_x(x), problem.with_values(**spec.values).p)
-    return {problem.objective.name: problem.objective.sign * point.cost, **point.indexes}
+    return {problem.objective.name: problem.objective.sign * point.cost, **point.metrics}
 
 
 def collect_cloud(spec: ProblemSpec, algorithm: str, evaluations: int, seed: int = 0) -> list[list[float]]:

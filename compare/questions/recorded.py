@@ -1,4 +1,4 @@
-"""A gait from elsewhere: its indexes and violations, its simulation, and the optimum of the same step and durations."""
+"""A gait from elsewhere: its metrics and violations, its simulation, and the optimum of the same step and durations."""
 
 import math
 from dataclasses import asdict, dataclass
@@ -33,8 +33,8 @@ class JudgedGait:
 
     def rows(self) -> list[tuple[str, float, float]]:
         """Return name and value of each index, and its value at the optimum, NaN if there is none."""
-        optimum = {} if self.optimum is None else self.optimum.indexes
-        return [(name, value, optimum.get(name, math.nan)) for name, value in self.evaluation.indexes.items()]
+        optimum = {} if self.optimum is None else self.optimum.metrics
+        return [(name, value, optimum.get(name, math.nan)) for name, value in self.evaluation.metrics.items()]
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""

@@ -65,7 +65,7 @@ class SweepPoint:
     violation: float  #: exact total violation
     evaluations: int  #: calls of f
     time_s: float  #: wall time [s]
-    indexes: Mapping[str, float] = field(default_factory=dict)  #: exact performance indexes
+    metrics: Mapping[str, float] = field(default_factory=dict)  #: exact metrics
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -169,7 +169,7 @@ class Sweep(Question[list[SweepPoint]]):
                     "x": dict(point.x),
                 }
                 for point in findings
-                if point.feasible and "cost_of_transport" in point.indexes  # for `simulate`
+                if point.feasible and "cost_of_transport" in point.metrics  # for `simulate`
             },
         )
 
@@ -184,7 +184,7 @@ def _make_point(values: Mapping[str, float], end: Solution) -> SweepPoint:
         violation=end.best.violation,
         evaluations=end.evaluations.f,
         time_s=end.time_s.solve,
-        indexes=build_exact_model(end.problem).at(end.best.x, end.problem.p).indexes,
+        metrics=build_exact_model(end.problem).at(end.best.x, end.problem.p).metrics,
     )
 
 

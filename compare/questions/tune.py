@@ -112,7 +112,7 @@ class Tune(Question[list[TunedGait]]):
 
     def find(self, work: Work) -> Iterator[list[TunedGait]]:
         """Yield the rows found so far; raises InputError for a problem that is no walk or cycle."""
-        if "energy_J_per_m" not in build_exact_model(self.problem).index_names:
+        if "energy_J_per_m" not in build_exact_model(self.problem).metric_names:
             raise InputError(
                 f"{self.problem.name} has no energy per metre; tune a walking cycle or a whole walk: nao-cycle"
             )
@@ -184,7 +184,7 @@ class Tune(Question[list[TunedGait]]):
             score=score,
             history=(*history, *end),
             limits=limits or {},
-            model_J_per_m=values.indexes["energy_J_per_m"],
+            model_J_per_m=values.metrics["energy_J_per_m"],
             rows_violated=len(model.find_violated(values)),
             here=here,
             elsewhere=tuple(elsewhere),

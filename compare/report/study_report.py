@@ -89,11 +89,11 @@ def _make_point_tables(comparisons: Sequence[Comparison]) -> dict[str, TableRows
         records = comparison.records
         names = list_variables(records)
         taken = {*names, *JUDGED}
-        indexes = list(dict.fromkeys(name for r in records for name in r.metrics if name not in taken))
+        metrics = list(dict.fromkeys(name for r in records for name in r.metrics if name not in taken))
         tables[f"{make_file_name(comparison.problem)}-points"] = [
-            ("solver", "run", *names, *JUDGED, *indexes),
+            ("solver", "run", *names, *JUDGED, *metrics),
             *(
-                (r.solver, r.run, *map(r.x.get, names), *make_row(r, JUDGED), *map(r.metrics.get, indexes))
+                (r.solver, r.run, *map(r.x.get, names), *make_row(r, JUDGED), *map(r.metrics.get, metrics))
                 for r in records
                 if r.x
             ),

@@ -124,7 +124,7 @@ def describe_evaluation(evaluation: Evaluation) -> dict[str, Any]:
         "objective": float(evaluation.objective["value"]),
         "violation": evaluation.violation,
         "feasible": evaluation.feasible,
-        "metrics": evaluation.indexes,
+        "metrics": evaluation.metrics,
         "feasible_between_samples": None if evaluation.dense is None else not evaluation.dense_violations,
         "violated": tuple(f"{row.name} by {row.violation:.3g} {row.unit}".removesuffix(" 1") for row in worst),
     }

@@ -173,7 +173,7 @@ def _check_points(spec: ProblemSpec, records: Sequence[RunRecord]) -> Iterator[D
             yield Difference(record.name, "differs", str(error))
             continue
         stated = {"objective": record.objective, "violation": record.violation, **record.metrics}
-        computed = {"objective": sign * values.cost, "violation": values.violation, **values.indexes}
+        computed = {"objective": sign * values.cost, "violation": values.violation, **values.metrics}
         for name in {**stated, **computed}:
             a, b = stated.get(name, math.nan), computed.get(name, math.nan)
             if not is_same(a, b, 0.0 if name == "objective" else 1.0):

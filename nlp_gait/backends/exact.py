@@ -32,7 +32,7 @@ class ExactValues(NamedTuple):
     g: Array  #: (m,) rows, the variables last
     lower: Array  #: (m,)
     upper: Array  #: (m,)
-    indexes: dict[str, float]  #: performance figures by name
+    metrics: dict[str, float]  #: performance figures by name
 
     @property
     def feasible(self) -> bool:
@@ -49,7 +49,7 @@ class ExactModel:
     row_groups: tuple[str, ...]  #: (m,) names of the constraints to which they belong, ``bounds`` for the variables
     row_units: tuple[str, ...]  #: (m,)
     row_scales: Array  #: (m,) scales of the violations [unit of the row]
-    index_names: tuple[str, ...]
+    metric_names: tuple[str, ...]
 
     @cached_property
     @lock_casadi
@@ -77,10 +77,10 @@ class ExactModel:
         for i, array in enumerate(outputs):
             buffer.set_res(i, array.data)
         call()
-        cost, violation, g, lower, upper, indexes = outputs
+        cost, violation, g, lower, upper, metrics = outputs
         if np.isnan(lower).any() or np.isnan(upper).any():  # CasADi's fmax ignores it
             violation = np.full(1, math.nan)
-        named = dict(zip(self.index_names, indexes.tolist(), strict=True))
+        named = dict(zip(self.metric_names, metrics.tolist(), strict=True))
         return ExactValues(float(cost[0]), float(violation[0]), g, lower, upper, named)
 
     def find_violated(self, values: ExactValues) -> tuple[ConstraintValue, ...]:
@@ -154,7 +154,7 @@ def _build(problem: GaitProblem) -> ExactModel:
     cost = problem.objective.sign * assembly.objective
     violation = ca.sum1(violations / scale)
     outputs = {"cost": cost, "violation": violation, "g": g, "lower": lower, "upper": upper}
-    outputs["indexes"] = ca.vertcat(*assembly.indexes.values())
+    outputs["metrics"] = ca.vertcat(*assembly.metrics.values())
     function = ca.Function(
         "exact", [point.x, point.p], [ca.densify(value) for value in outputs.values()], ["x", "p"], list(outputs)
     )
@@ -164,14 +164,14 @@ def _build(problem: GaitProblem) -> ExactModel:
     names += [f"bounds[{name}]" for name in problem.names]
     units += [variable.unit for variable in problem.variables]
     scales = np.array(ca.evalf(scale)).ravel()
-    indexes = tuple(assembly.indexes)
+    metrics = tuple(assembly.metrics)
     model = ExactModel(
         function=function,
         row_names=tuple(names),
         row_groups=tuple(groups),
         row_units=tuple(units),
         row_scales=scales,
-        index_names=indexes,
+        metric_names=metrics,
     )
     _check_change(problem, model)
     return model

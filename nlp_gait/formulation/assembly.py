@@ -251,10 +251,10 @@ class Assembly:
     objective: MX  #: scalar, in the problem's own sense
     constraints: tuple[Constraint, ...]  #: groups of rows
     #: named performance figures (scalars); meaningful under ``Exact`` only
-    indexes: Mapping[str, MX] = field(default_factory=dict)
+    metrics: Mapping[str, MX] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for owner, value in (("objective", self.objective), *((f"index {n!r}", v) for n, v in self.indexes.items())):
+        for owner, value in (("objective", self.objective), *((f"metric {n!r}", v) for n, v in self.metrics.items())):
             if not isinstance(value, MX) or value.shape != (1, 1):
                 shown = f"{type(value).__name__} {format_value(value)}"
                 got = f"shape {value.shape}" if isinstance(value, MX) else shown
@@ -329,7 +329,7 @@ class RowsOverTime:
     """Rows of one phase of a motion as functions of time, which also defines them between samples."""
 
     name: str = ""  #: of the phase; empty if the motion has one phase only
-    #: From a point, times (1, k) as fractions of the phase and an interpretation to the rows and indexes with samples at these
+    #: From a point, times (1, k) as fractions of the phase and an interpretation to the rows and metrics with samples at these
     #: times; ``Constraint.over`` tells how a row depends on them
     assemble: Callable[[Point, MX, Nonsmooth], Assembly]
     #: From the values of variables and parameters by name to the start and the end of the phase [s]

@@ -226,7 +226,7 @@ def check_mathematics(problem: GaitProblem) -> None:
     inputs = [point.x, point.p]
     bounds: dict[str, MX] = {}
     expressions = {"objective": assembly.objective}
-    expressions |= {f"index {name!r}": value for name, value in assembly.indexes.items()}
+    expressions |= {f"metric {name!r}": value for name, value in assembly.metrics.items()}
     for constraint in assembly.constraints:
         row = f"constraint {constraint.name!r}"
         expressions[row] = constraint.value
@@ -256,7 +256,7 @@ def check_mathematics(problem: GaitProblem) -> None:
 def _check_texts(owner: str, problem: GaitProblem, assembly: Assembly) -> None:
     """Check that files, tables and axes can show all names and units."""
     quantities: tuple[Variable | Parameter, ...] = (*problem.variables, *problem.own_parameters)
-    texts = [problem.objective.name, problem.objective.unit, *assembly.indexes]
+    texts = [problem.objective.name, problem.objective.unit, *assembly.metrics]
     texts += [text for quantity in quantities for text in (quantity.name, quantity.unit)]
     texts += [text for group in assembly.constraints for text in (group.name, group.unit, *group.labels)]
     for text in texts:

@@ -191,8 +191,8 @@ def _compare(problem: GaitProblem, form: PowerForm) -> None:
         expected = model.at(x, problem.p)
         if (np.maximum(expected.lower - expected.g, expected.g - expected.upper)[domain] > 0.0).any():
             continue
-        for name, value in zip(form.indexes.name_out(), form.indexes.call([form.to_z(x)]), strict=True):
-            exact = expected.indexes[name]
+        for name, value in zip(form.metrics.name_out(), form.metrics.call([form.to_z(x)]), strict=True):
+            exact = expected.metrics[name]
             if not abs(float(value) - exact) <= AGREEMENT * (1.0 + abs(exact)):
                 raise InputError(
                     f"problem {problem.name!r}: {name} is {float(value)} in its least-power form and {exact} in the exact "

@@ -42,7 +42,7 @@ class Guarantee:
     # Rows that are not proven to be satisfied, by the time at which that begins
     violations: tuple[RowViolation, ...] = ()
     sampled: tuple[str, ...] = ()  # rows that are defined on samples only; the judge checks them there
-    # Bounds of true time means and integrals, by the name of the index
+    # Bounds of true time means and integrals, by the name of the metric
     means: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     reason: str = ""  # why nothing is proven, or empty
 

@@ -46,8 +46,8 @@ class PowerForm:
     rows: PowerRows  # roles of these outputs. Their bounds contain every point that the judge accepts
     poses: ca.Function  # maps z to the outputs of the rows that cost little, which are bounded first
     pose_rows: Integers  # (E,) numbers of these rows in ``rows``
-    # Maps z to indexes of the problem, under the same names; they are compared with the exact functions within reach
-    indexes: ca.Function
+    # Maps z to metrics of the problem, under the same names; they are compared with the exact functions within reach
+    metrics: ca.Function
 
 
 # Operations of a tape, as in native/quadratic.hpp.

@@ -65,7 +65,7 @@ class TimeRows:
     ) -> None:
         """Read the instructions of a function of (x, p, phase) or (x, p, phase, phase an interval later)."""
         constraints, names, units, values, lower, upper = zip(*plain, *averaged, strict=True)
-        self.names, self.units, self.plain = names, units, len(plain)  # no unit: an index, which has no bounds
+        self.names, self.units, self.plain = names, units, len(plain)  # no unit: a metric, which has no bounds
         self._bounds = ca.Function("bounds", [inputs[1]], [ca.vertcat(*lower), ca.vertcat(*upper)])
         function = ca.Function("rows", list(inputs), [ca.vertcat(*values)])
         arguments = function.sx_in()
@@ -101,7 +101,7 @@ class TimeFunctions(NamedTuple):
     """Rows over time of one phase as enclosed functions."""
 
     source: RowsOverTime  # the rows over time
-    instants: TimeRows | None  # rows of each instant, and values whose time means are rows or indexes
+    instants: TimeRows | None  # rows of each instant, and values whose time means are rows or metrics
     changes: TimeRows | None  # rows of each interval
     sampled: tuple[str, ...]  # rows that are defined on samples only
 
@@ -119,9 +119,9 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
     wanted = {constraint.name for constraint in by_kind["interval"]}
     instants = [row for constraint in by_kind["instant"] for row in _select_first_sample(constraint)]
     means = [row for c in by_kind["mean"] for row in _split(c)]
-    means_of = [name for name in source.means if name in still.indexes]
-    indexes = [(name, name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in means_of]
-    averaged, kinks = [*means, *indexes], bool(source.kinks)
+    means_of = [name for name in source.means if name in still.metrics]
+    metrics = [(name, name, "", still.metrics[name], MX(-np.inf), MX(np.inf)) for name in means_of]
+    averaged, kinks = [*means, *metrics], bool(source.kinks)
     changes = [row for c in moved.constraints if c.name in wanted for row in _select_first_sample(c)]
     given = [point.x, point.p, now]
     at_once = TimeRows(instants, averaged, given, kinks) if instants or averaged else None

@@ -51,7 +51,7 @@ def test_what_is_maximised_costs_its_negative_and_is_indexed_as_it_is() -> None:
 
     out = evaluate(toy(mathematics, "maximise"), (1.0, 2.0))
     assert out.cost == pytest.approx(-3.0)
-    assert out.indexes == pytest.approx({"cost": 3.0})
+    assert out.metrics == pytest.approx({"cost": 3.0})
 
 
 def test_violated_rows_are_named_worst_first() -> None:

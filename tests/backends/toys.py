@@ -21,7 +21,7 @@ def toy(
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         objective, constraints = mathematics(point["x"], point["y"], point["limit"], ops)
-        return Assembly(objective=objective, constraints=constraints, indexes={"cost": objective})
+        return Assembly(objective=objective, constraints=constraints, metrics={"cost": objective})
 
     return GaitProblem(
         name="toy",

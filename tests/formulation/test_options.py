@@ -101,7 +101,7 @@ def test_the_judge_counts_the_intervals_of_its_grid() -> None:
     assert dense is not None
     assert verdict.dense_intervals == 34 * 30
     assert len(dense.signals(middle).arrays["t"]) == 2 * verdict.dense_intervals + 1  # of each phase
-    assert verdict.dense == evaluated(dense, middle).indexes
+    assert verdict.dense == evaluated(dense, middle).metrics
 
 
 def test_the_samples_of_a_trajectory_are_recorded() -> None:

@@ -115,11 +115,11 @@ def test_a_row_is_refused_by_name(change: dict[str, Any], message: str) -> None:
 
 def test_objectives_variables_and_parameters_are_refused_by_name() -> None:
     with pytest.raises(InputError, match="objective must be a scalar MX, got shape \\(3, 1\\)"):
-        Assembly(objective=THREE, constraints=(), indexes={})
-    with pytest.raises(InputError, match="index 'power_W' must be a scalar MX, got float 1.0"):
-        Assembly(objective=MX.sym("f"), constraints=(), indexes={"power_W": 1.0})  # type: ignore[dict-item]
+        Assembly(objective=THREE, constraints=(), metrics={})
+    with pytest.raises(InputError, match="metric 'power_W' must be a scalar MX, got float 1.0"):
+        Assembly(objective=MX.sym("f"), constraints=(), metrics={"power_W": 1.0})  # type: ignore[dict-item]
     with pytest.raises(InputError, match="constraints must be Constraint, got int 3"):
-        Assembly(objective=MX.sym("f"), constraints=(3,), indexes={})  # type: ignore[arg-type]
+        Assembly(objective=MX.sym("f"), constraints=(3,), metrics={})  # type: ignore[arg-type]
     with pytest.raises(InputError, match="variable 'lift': lower must be below upper, got 1.0 and 1.0"):
         Variable(name="lift", unit="m", lower=1.0, upper=1.0, description="")
     with pytest.raises(InputError, match="parameter 'mass': default must be a finite number, got None"):

@@ -124,13 +124,13 @@ def test_the_zmp_is_limited_by_the_hull_of_rotated_soles(problem: GaitProblem, b
 
 def test_energy_and_distance_are_those_of_all_phases(problem: GaitProblem, plan: Plan) -> None:
     x = problem.start_point(np.random.default_rng(0))
-    indexes = build_exact_model(problem).at(x, problem.p).indexes
-    assert indexes["duration_s"] == pytest.approx(plan.duration_s)
+    metrics = build_exact_model(problem).at(x, problem.p).metrics
+    assert metrics["duration_s"] == pytest.approx(plan.duration_s)
     paths = (
         np.linalg.norm(np.diff(plan.signals.arrays[f"{side}_foot"][:, :2], axis=0), axis=1).sum() for side in SIDES
     )
-    assert indexes["distance_m"] == pytest.approx(sum(paths) / 2, rel=1e-6)
-    assert indexes["energy_J_per_m"] == pytest.approx(indexes["energy_J"] / indexes["distance_m"])
+    assert metrics["distance_m"] == pytest.approx(sum(paths) / 2, rel=1e-6)
+    assert metrics["energy_J_per_m"] == pytest.approx(metrics["energy_J"] / metrics["distance_m"])
 
 
 def test_a_start_from_a_cycle_has_its_states_in_all_steps(problem: GaitProblem) -> None:

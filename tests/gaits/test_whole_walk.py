@@ -60,8 +60,8 @@ def test_a_walk_of_two_half_steps_has_no_inner_step() -> None:
     x, model = two.start_point(np.random.default_rng(0)), build_exact_model(two)
     found = model.at(x, two.p)
     assert not [row.name for row in model.rows(found) if row.name.startswith(("ssp_", "dsp_", "speed"))]
-    assert "least_speed_m_s" not in two.parameter_values and "speed_m_s" not in found.indexes
-    assert found.indexes["distance_m"] == pytest.approx(two.by_name(x)["step_length_m"])
+    assert "least_speed_m_s" not in two.parameter_values and "speed_m_s" not in found.metrics
+    assert found.metrics["distance_m"] == pytest.approx(two.by_name(x)["step_length_m"])
 
 
 def test_on_a_slope_the_weight_acts_behind_the_centre_of_mass() -> None:
@@ -85,7 +85,7 @@ def test_energy_and_duration_count_every_inner_step(x: np.ndarray) -> None:
     found = {}
     for steps in (3, 8):
         problem = nlp_gait.load("nao-walk", steps=steps)
-        found[steps] = build_exact_model(problem).at(x, problem.p).indexes
+        found[steps] = build_exact_model(problem).at(x, problem.p).metrics
         signals = problem.signals(x)
         assert found[steps]["duration_s"] == pytest.approx(signals.arrays["t"][-1])
     cycle = found[3]["cycle_energy_J_per_m"] * found[3]["distance_m"] / 2
@@ -101,11 +101,11 @@ def test_a_plan_is_feasible_and_walks_in_the_engine(tmp_path: Path) -> None:
     assert data["distance_m"] == pytest.approx(0.1, abs=1e-7)
     again = load_result(path)
     assert again.problem.options["steps"] == 3 and again.problem.by_name(again.x) == data["x"]
-    indexes = build_exact_model(again.problem).at(again.x, again.problem.p).indexes
-    assert data["duration_s"] == pytest.approx(indexes["duration_s"]) and again.problem.options["intervals"] == 2
-    assert abs(indexes["energy_J"] / data["energy_J"] - 1.0) > 0.05  # three samples a phase
+    metrics = build_exact_model(again.problem).at(again.x, again.problem.p).metrics
+    assert data["duration_s"] == pytest.approx(metrics["duration_s"]) and again.problem.options["intervals"] == 2
+    assert abs(metrics["energy_J"] / data["energy_J"] - 1.0) > 0.05  # three samples a phase
     assert (
-        indexes["ssp_dbm_x_min_m"] > MARGINS[0] * 0.15 - 1e-6 and indexes["ssp_dbm_y_min_m"] > MARGINS[1] * 0.08 - 1e-6
+        metrics["ssp_dbm_x_min_m"] > MARGINS[0] * 0.15 - 1e-6 and metrics["ssp_dbm_y_min_m"] > MARGINS[1] * 0.08 - 1e-6
     )
     simulated, balanced = as_json("simulate", path, "--feedback", "none"), as_json("simulate", path)
     assert (simulated["mode"], balanced["mode"]) == ("in open loop", "with balance feedback")
@@ -121,7 +121,7 @@ def test_a_start_shows_whether_a_grid_is_too_coarse(monkeypatch: pytest.MonkeyPa
     problem = nlp_gait.load("nao-walk", steps=3, intervals=2).fix(step_length_m=0.05)
     x, said = np.clip(problem.start_point(np.random.default_rng(0)), problem.lower, problem.upper), list[str]()
     fine = nlp_gait.load("nao-walk", steps=3, intervals=24)
-    coarse, right = (build_exact_model(p).at(x, p.p).indexes["energy_J"] for p in (problem, fine))
+    coarse, right = (build_exact_model(p).at(x, p.p).metrics["energy_J"] for p in (problem, fine))
     error = abs(coarse / right - 1.0)
     for limit, refined in ((0.9 * error, True), (1.1 * error, False)):
         monkeypatch.setattr("nlp_gait.backends.plan_walk.ENERGY_ERROR", limit)

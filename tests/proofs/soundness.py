@@ -95,8 +95,8 @@ def find_contradictions(problem: GaitProblem, gaits: list[Array], samples: int) 
             if name not in proven.sampled and value > most + (slack if name.endswith("_mean") else ROUNDING):
                 found.append(f"{problem.name} {x.tolist()}: {name} by {value} on the grid, {most} proven")
         for name, (low, high) in proven.means.items():
-            if not low - slack * abs(low) <= values.indexes[name] <= high + slack * abs(high):
-                found.append(f"{problem.name} {x.tolist()}: {name} {values.indexes[name]} outside [{low}, {high}]")
+            if not low - slack * abs(low) <= values.metrics[name] <= high + slack * abs(high):
+                found.append(f"{problem.name} {x.tolist()}: {name} {values.metrics[name]} outside [{low}, {high}]")
     return found, satisfied
 
 

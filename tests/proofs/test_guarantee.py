@@ -32,7 +32,7 @@ def waving(limit: float, over: Over | None = "instant") -> GaitProblem:
         if over == "interval":
             value, labels = (wave[1:] - wave[:-1]).T, names[1:]
         rows = Constraint(name="wave", labels=labels, unit="m", scale=1.0, value=value, upper=MX(limit), over=over)
-        return Assembly(objective=MX(0), constraints=(rows,), indexes={"mean_m": ca.sum2(wave) / phases.shape[1]})
+        return Assembly(objective=MX(0), constraints=(rows,), metrics={"mean_m": ca.sum2(wave) / phases.shape[1]})
 
     rows = RowsOverTime(assemble=at_phases, times=lambda values: (1.0, 3.0), intervals=4, means=("mean_m",))
     base = toy(lambda x, y, lim, ops: (x, (row(0 * y, lower=MX(0.0)),)))
@@ -65,7 +65,7 @@ def test_up_to_a_kink_only_the_formula_before_it_counts() -> None:
         value = 5 * after - 6 * point.x[0] * after
         labels = tuple(f"jump, {k}" for k in range(phases.shape[1]))
         rows = Constraint(name="jump", labels=labels, unit="m", scale=1.0, value=value.T, upper=MX(0.3), over="instant")
-        return Assembly(objective=MX(0), constraints=(rows,), indexes={})
+        return Assembly(objective=MX(0), constraints=(rows,), metrics={})
 
     rows = RowsOverTime(assemble=at_phases, times=lambda values: (0.0, 1.0), intervals=4, kinks=(0.5,))
     kinked = replace(waving(0.5), rows_over_time=(rows,))
@@ -128,7 +128,7 @@ def test_a_row_without_bounds_on_the_way_is_open_and_no_number_hides_it() -> Non
         )
         wild = Constraint(name="wild", labels=names, unit="m", scale=1.0, value=pole.T, upper=MX(1e6), over="instant")
         mean = Constraint(name="mean", unit="m", scale=1.0, value=ca.sum2(pole), upper=MX(0.0), over="mean")
-        return Assembly(objective=MX(0), constraints=(rows, wild, mean), indexes={"mean_m": ca.sum2(pole)})
+        return Assembly(objective=MX(0), constraints=(rows, wild, mean), metrics={"mean_m": ca.sum2(pole)})
 
     rows = RowsOverTime(assemble=at_phases, times=lambda values: (0.0, 1.0), means=("mean_m",))
     found = guarantee(replace(waving(PEAK), rows_over_time=(rows,)), np.array([PEAK, 0.0]))

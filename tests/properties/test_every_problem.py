@@ -67,7 +67,7 @@ def test_every_output_is_finite_for_every_finite_x(name: str, kind: str | None, 
     problem = problem_of(name, kind)
     x = np.array(data.draw(st.lists(far, min_size=len(problem.names), max_size=len(problem.names))))
     found = evaluated(problem, x)
-    assert np.isfinite([found.cost, found.violation, *found.g, *found.indexes.values()]).all()
+    assert np.isfinite([found.cost, found.violation, *found.g, *found.metrics.values()]).all()
 
 
 @of_every_variant
@@ -182,7 +182,7 @@ def test_gradient_and_jacobian_are_differences_of_values(name: str) -> None:
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_every_row_and_index_has_its_own_name(name: str) -> None:
     model = build_exact_model(problem_of(name))
-    for names in (model.row_names, model.index_names):
+    for names in (model.row_names, model.metric_names):
         assert len(set(names)) == len(names)
     assert len(model.row_names) == len(model.row_units) == len(model.row_scales)
     assert (model.row_scales > 0.0).all()

@@ -59,7 +59,7 @@ def robot() -> Mapping[str, Any]:
 
 
 def single_support(X: Array, robot: Mapping[str, Any], reading: Reading = Reading()) -> dict[str, Array]:
-    """Objective, rows and indexes by name, each (P,), at X (P, 9)."""
+    """Objective, rows and metrics by name, each (P,), at X (P, 9)."""
     x1, x2, x3, x4, x5, x6, x7, x8, x9 = X.T[:, None, :]
     T = np.broadcast_to(x9, (reading.samples, len(X)))
     t = time(np.linspace(0.0, 1.0, reading.samples)[:, None] * x9, 2)
@@ -282,7 +282,7 @@ def _collected(
     margins: Iterable[Array],
     T: Array,
 ) -> dict[str, Array]:
-    """Objective, rows, indexes, each (P,)."""
+    """Objective, rows, metrics, each (P,)."""
     drawn = sum(np.abs(torque[name] * angles[name].d(1)) + HEAT * torque[name] ** 2 for name in JOINTS)
     samples = len(T)
     weights = np.full(samples, 1.0)

@@ -35,7 +35,7 @@ class Moment(NamedTuple):
 
 
 def step(X: Array, length: float = 0.508, ratio: float = 0.70) -> dict[str, Array]:
-    """Objective, rows and indexes by name, each (P,), at X (P, 11) on a double step of this length [m]."""
+    """Objective, rows and metrics by name, each (P,), at X (P, 11) on a double step of this length [m]."""
     x = dict(zip(("z", "hip", "zmp0", "zmp1", "rate", "torso", "t1", "t2", "t_bc", "pitch", "share"), X.T, strict=True))
     run, rise = length / 2, ratio * length / 2
     ends = np.stack([np.zeros(len(X)), x["t1"], x["t2"], x["t_bc"], np.full(len(X), T3)])

@@ -45,12 +45,12 @@ def compared(problem: GaitProblem, referee: Referee, X: Array, of: str = "") -> 
         of: only rows whose names begin so.
     """
     model = build_exact_model(problem)
-    cost, _, g, _, _, indexes = (np.array(value) for value in model.function(X.T, problem.p))
+    cost, _, g, _, _, metrics = (np.array(value) for value in model.function(X.T, problem.p))
     with np.errstate(invalid="ignore"):  # beyond the arc of the hip, between samples
         expected = referee(X)
     named = [*zip(model.row_names, model.row_scales, g, strict=True)]
-    named += [(name, 1.0, values) for name, values in zip(model.index_names, indexes, strict=True)]
-    objective = problem.objective.name if problem.objective.name in expected else model.index_names[0]
+    named += [(name, 1.0, values) for name, values in zip(model.metric_names, metrics, strict=True)]
+    objective = problem.objective.name if problem.objective.name in expected else model.metric_names[0]
     named.append((objective, 1.0, problem.objective.sign * cost[0]))
     found: dict[str, float] = {}
     for name, scale, values in named:

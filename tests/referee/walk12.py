@@ -13,7 +13,7 @@ THIGH, SHANK, WIDTH, SOLE = 0.19, 0.15, 0.12, 0.02
 BACK, FRONT, BREADTH = 0.03, 0.07, 0.055
 GRAVITY = 9.81
 F1_MAX, F2_MAX = 442.522, 0.13  # section 7
-INTERVALS = 20  # of the indexes; every second one is an instant of the reach
+INTERVALS = 20  # of the metrics; every second one is an instant of the reach
 PANELS, NODES = 10, 16  # of Gauss's rule for (9)
 
 
@@ -27,7 +27,7 @@ class Leg(NamedTuple):
 
 
 def walk(X: Array, weight: float = 0.15, T: float = 1.0, static_load: bool = False) -> dict[str, Array]:
-    """Objective, rows and indexes by name, each (P,), at X (P, 4): s, n, H, h.
+    """Objective, rows and metrics by name, each (P,), at X (P, 4): s, n, H, h.
 
     Args:
         X: variables.

@@ -63,15 +63,15 @@ def compute_lead(result: NaoResults, phase: str, kind: str) -> float:
     return 1000 * (ga - pso)
 
 
-def list_margins(result: NaoResults, phase: str, indexes: Sequence[str] = MARGINS) -> list[float]:
+def list_margins(result: NaoResults, phase: str, metrics: Sequence[str] = MARGINS) -> list[float]:
     """Return margins of both printed solutions [mm]."""
-    return [1000 * result.measure(phase, search)[index] for search in SEARCHES for index in indexes]
+    return [1000 * result.measure(phase, search)[metric] for search in SEARCHES for metric in metrics]
 
 
-def list_leads(result: NaoResults, phase: str, indexes: Sequence[str]) -> list[float]:
+def list_leads(result: NaoResults, phase: str, metrics: Sequence[str]) -> list[float]:
     """Return margins of PSO's printed solution less those of GA's [mm], as many digits as in print."""
     pso, ga = (result.measure(phase, search) for search in SEARCHES)
-    return [round(1000 * (pso[index] - ga[index]), 1) for index in indexes]
+    return [round(1000 * (pso[metric] - ga[metric]), 1) for metric in metrics]
 
 
 def compute_excess(result: NaoResults, phase: str) -> float | None:

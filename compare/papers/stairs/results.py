@@ -103,12 +103,12 @@ class StairsResults:
         return [choose_best(self.runs[make_title(self.tracking, case), "aco"]) for case in TABLE_4]
 
     def list_ends(self, name: str) -> list[list[float]]:
-        """Return a tuned value or an index at the ends of all feasible runs of the colony, by case."""
+        """Return a tuned value or a metric at the ends of all feasible runs of the colony, by case."""
         runs = [self.runs[make_title(self.tracking, case), "aco"] for case in TABLE_4]
         return [[{**run.x, **run.metrics}[name] for run in of_case if run.feasible] for of_case in runs]
 
     def list_tracked(self, name: str) -> list[float]:
-        """Return a tuned value or an index of the tracked steps of all cases."""
+        """Return a tuned value or a metric of the tracked steps of all cases."""
         return [{**run.x, **run.metrics}[name] for run in self.tracked]
 
 
@@ -198,12 +198,12 @@ def tune_otherwise(spec: ProblemSpec, x: Sequence[float], evaluations: int) -> d
     problem = spec.load()
 
     def drop_power(assembly: Assembly, point: Point, _: Nonsmooth) -> Assembly:
-        margin = point["zmp_weight"] * assembly.indexes["zmp_margin_min_m"]
-        return replace(assembly, objective=assembly.indexes["tracking_cost"] - margin)
+        margin = point["zmp_weight"] * assembly.metrics["zmp_margin_min_m"]
+        return replace(assembly, objective=assembly.metrics["tracking_cost"] - margin)
 
     objective = compile_objective(problem.derive(name="stairs-errors", change=drop_power))
     tuned = minimize(objective, COLONY, evaluations=evaluations, seed=0).x
     points = {"without_power": tuned.tolist(), "upright": [*x[:2], np.pi / 2]}
-    indexes = {name: evaluate(problem, point).indexes for name, point in points.items()}
-    numbers = {f"{name}_J": float(found["energy_J"]) for name, found in indexes.items()}
-    return numbers | {"upright_margin_m": float(indexes["upright"]["zmp_margin_min_m"])}
+    metrics = {name: evaluate(problem, point).metrics for name, point in points.items()}
+    numbers = {f"{name}_J": float(found["energy_J"]) for name, found in metrics.items()}
+    return numbers | {"upright_margin_m": float(metrics["upright"]["zmp_margin_min_m"])}

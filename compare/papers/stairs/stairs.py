@@ -134,11 +134,11 @@ NUMBERS: dict[str, Callable[[StairsResults], Any]] = {
     "seams": lambda r: measure_equations(TABLE_4[DRAWN_CASE])["bezier"]["jump of the ankle's speed at t2 [m/s]"],
     "mass-matrix": lambda r: printed.measure_dynamics()[0],
     "skew": lambda r: printed.measure_dynamics()[1],
-    "zmp-printed": lambda r: [1000 * indexes["zmp_margin_min_m"] for indexes in evaluate_printed(r)],
+    "zmp-printed": lambda r: [1000 * metrics["zmp_margin_min_m"] for metrics in evaluate_printed(r)],
     "network": lambda r: get_network(r)["converged_%"],
     "real-time": lambda r: get_network(r)["later_converged_%"],
     "warm-network": lambda r: 100 * get_network(r)["later_steps"] / get_network(r)["first_steps"],
-    "printed-gains": lambda r: [indexes["largest_error_rad"] for indexes in evaluate_printed(r)],
+    "printed-gains": lambda r: [metrics["largest_error_rad"] for metrics in evaluate_printed(r)],
 }
 NUMBERS_OF_RUNS: dict[str, Callable[[StairsResults], Any]] = {
     "best-cost": lambda r: list_run_leads(r, "controller_cost"),

@@ -41,7 +41,7 @@ class Margin:
 
     def evaluate(self, problem: GaitProblem, x: Array) -> float:
         """Return the exact value at x (n,)."""
-        return build_exact_model(problem).at(x, problem.p).indexes[f"{self.name}_m"]
+        return build_exact_model(problem).at(x, problem.p).metrics[f"{self.name}_m"]
 
     def evaluate_many(self, objective: CompiledObjective, X: Array) -> Array:
         """Return the values (P,) of candidates (P, n)."""

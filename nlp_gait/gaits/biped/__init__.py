@@ -8,9 +8,9 @@ From a robot to the first constraint, in reading order:
     Instant   motion of the robot at one instant, then its torques, ZMP and ground wrenches (``samples.py``)
     Phase     single or double support: a plan of instants over a Grid, loads, limits and a goal (``phase.py``)
     Samples   a phase evaluated at all its samples, each once (``samples.py``)
-    Limit     adds rows, their parameters and performance indexes (``limits.py``)
+    Limit     adds rows, their parameters and metrics (``limits.py``)
     Goal      what is minimised: power, torques or smoothness (``limits.py``)
-    Assembly  objective, rows and indexes of a problem (``nlp_gait.formulation``)
+    Assembly  objective, rows and metrics of a problem (``nlp_gait.formulation``)
 
 ``support_phases.py`` composes a phase, ``cycle.py`` joins both by the switches of ``sequence.py``, ``walk.py`` more phases;
 ``phase_problem.py`` makes the problem, ``problems.py`` declares the options.

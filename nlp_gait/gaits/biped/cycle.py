@@ -175,7 +175,7 @@ class WalkingCycle(Sequence):
         return point.extend(STEP, point[SPEED] * (point[TIMES[Support.SINGLE]] + point[TIMES[Support.DOUBLE]]))
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
-        """Return objective, rows and indexes.
+        """Return objective, rows and metrics.
 
         Torques may change by ``torque_change_limit_Nm`` over every interval of both phases, and at a switch by another limit,
         which is off by default: the published one is for a change over an interval of time, while at a switch the
@@ -196,13 +196,13 @@ class WalkingCycle(Sequence):
         return Assembly(
             objective=mean if self.at_given_speed else energy / step,
             constraints=(*sections.rows, *rows),
-            indexes={
+            metrics={
                 "power_W": energy / period,
                 "energy_J_per_m": energy / step,
                 "cost_of_transport": energy / step / self.body.weight,
                 "speed_m_s": step / period,
                 "step_length_m": step,
-                **sections.indexes,
+                **sections.metrics,
                 **jump,
                 **landing,
             },

@@ -1,4 +1,4 @@
-"""Limits of a phase: each adds the rows, the parameters and the indexes of one concern; and goals, what a phase minimises."""
+"""Limits of a phase: each adds the rows, the parameters and the metrics of one concern; and goals, what a phase minimises."""
 
 import math
 from abc import ABC, abstractmethod
@@ -29,8 +29,8 @@ Side = TypeVar("Side", float, MX)
 # Balance margins in x and y, (1, N + 1) each [m], from the ZMP (2, N + 1) [m], the point and an interpretation.
 Margins = Callable[[MX, Point, Nonsmooth], tuple[MX, MX]]
 
-# What a limit adds: rows, and performance indexes by name.
-RowsAndIndexes: TypeAlias = tuple[Sequence[Constraint], Mapping[str, MX]]
+# What a limit adds: rows, and metrics by name.
+RowsAndMetrics: TypeAlias = tuple[Sequence[Constraint], Mapping[str, MX]]
 
 
 class Limit(ABC):
@@ -42,8 +42,8 @@ class Limit(ABC):
     ] = ()  # of the samples, evaluated with those of every phase; others take an evaluation more
 
     @abstractmethod
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        """Return the rows at a point, and performance indexes by name."""
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
+        """Return the rows at a point, and metrics by name."""
 
 
 def make_rows(
@@ -86,7 +86,7 @@ class JointLimits(Limit):
             for end, value in zip(("lower", "upper"), both, strict=True)
         )
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         n = samples.steps + 1
         limits = (ca.vertcat(*(point[f"{joint}_rad.{end}"] for joint in self._planned)) for end in ("lower", "upper"))
         lower, upper = (ca.repmat(limit, n, 1) for limit in limits)
@@ -100,7 +100,7 @@ class Reach(Limit):
         (REACH_MARGIN, "1", 0.01, "distance of a knee's cosine from +-1: 0.01 keeps it bent by 0.14 rad", 0.0, 0.5)
     )
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         limit = 1 - point[REACH_MARGIN]
         return [make_rows_at_samples("reach", "1", samples.reach, LEGS, -limit, limit)], {}
 
@@ -108,7 +108,7 @@ class Reach(Limit):
 class Closure(Limit):
     """Legs that end at their feet where Newton's method computes their angles; gradient solvers have equations instead."""
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         # A gradient solver needs the same rows in the same places: there they are far below their bound.
         miss = samples.miss if ops.exact else -MX.ones(len(LEGS), samples.steps + 1)
         return [make_rows_at_samples("closure", "m", miss, LEGS, None, MX(CLOSURE_M))], {}
@@ -122,7 +122,7 @@ class DriveLimits(Limit):
     def __init__(self, robot: Robot, size: float) -> None:
         self._robot, self._size = robot, size
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         joint = self._robot.joint
         efforts = [joint(name).torque_limit_Nm for name in samples.joints]
         speeds = [joint(name).velocity_limit_rad_s for name in samples.moving]
@@ -157,7 +157,7 @@ class TorqueChange(Limit):
             ("torque_change_limit_Nm", "Nm", limit, "largest change of a torque over one interval", 0.0, math.inf)
         )
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         step = samples.grid.samples_per_interval
         change = samples.torque[:, step:] - samples.torque[:, :-step]
         limit = point["torque_change_limit_Nm"]
@@ -197,7 +197,7 @@ class BalanceMargins(Limit):
             ("dbm_y_mean_limit_m", "m", y, "least mean margin in y", -math.inf, math.inf),
         )
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         n = samples.steps + 1
         margins = dict(zip("xy", self._margins(samples.zmp, point, ops), strict=True))
         means = {axis: samples.average_margins(margin) for axis, margin in margins.items()}
@@ -225,7 +225,7 @@ class ArmLimits(Limit):
         self._joints = tuple(joints)
         self._limits = np.array([robot.joint(joint).planning_limits_rad for joint in joints])
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         angles = samples.arm_angle[:, 1:-1]
         lower, upper = (MX(DM(np.tile(limits, angles.shape[1]))) for limits in self._limits.T)
         return [make_rows_at_samples("arm_angle", "rad", angles, self._joints, lower, upper, first=1)], {}
@@ -239,7 +239,7 @@ class SplineClearance(Limit):
     def __init__(self, path: Callable[[InstantPoint, ca.SX], ca.SX], middle: float, least_height: str) -> None:
         self._path, self._middle, self._least_height = path, middle, least_height
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         n, heights = samples.steps, samples.swing_heights[1:-1]
         above = make_rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)], over="instant")
         # Half the phase is a sample only on some grids.
@@ -282,7 +282,7 @@ class Goal:
     reads: tuple[Quantity, ...] = ()  # see ``Limit.reads``
 
     def evaluate(self, point: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX]]:
-        """Return the objective and the indexes: power, and what is minimised instead."""
+        """Return the objective and the metrics: power, and what is minimised instead."""
         value = self.compute(point, samples, ops)
         if self.objective is POWER:
             return value, {"power_W": value}

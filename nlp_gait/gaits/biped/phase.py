@@ -120,14 +120,14 @@ class Phase:
         return tuple(sorted(unique.values(), key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
 
     def assemble(self, point: Point, ops: Nonsmooth, samples: Samples | None = None) -> Assembly:
-        """Return the rows of all limits, the goal, and the indexes of both; by default at all samples."""
+        """Return the rows of all limits, the goal, and the metrics of both; by default at all samples."""
         samples = self.sample(point, ops) if samples is None else samples
         added = [limit.add(point, samples, ops) for limit in self.every_limit]
-        value, indexes = self.goal.evaluate(point, samples, ops)
+        value, metrics = self.goal.evaluate(point, samples, ops)
         return Assembly(
             objective=value,
             constraints=tuple(row for rows, _ in added for row in rows),
-            indexes={**indexes, **{name: index for _, of_limit in added for name, index in of_limit.items()}},
+            metrics={**metrics, **{name: metric for _, of_limit in added for name, metric in of_limit.items()}},
         )
 
     def sample(self, point: Point, ops: Nonsmooth, phases: MX | None = None) -> Samples:

@@ -50,7 +50,7 @@ class SwitchState(NamedTuple):
 def limit_torque_jump(
     switch: str, body: Body, point: Point, before: Samples, after: Samples, *, mirrored: bool = False
 ) -> tuple[Constraint, dict[str, MX]]:
-    """Return the row that limits the jumps of torques at a switch, and an index, the largest one [Nm].
+    """Return the row that limits the jumps of torques at a switch, and a metric, the largest one [Nm].
 
     Positions and rates are continuous. With ``mirrored`` the mirror image of the phase follows, as after the last one of a cycle.
     """
@@ -118,7 +118,7 @@ class End(NamedTuple):
 class MotionSection(NamedTuple):
     """A phase of a longer motion over the left foot, which stands at x = 0."""
 
-    name: str  # before the names of its rows and indexes
+    name: str  # before the names of its rows and metrics
     kind: Support
     begin: End
     end: End
@@ -137,7 +137,7 @@ class AssembledSections(NamedTuple):
     times: Mapping[str, MX]  # durations [s]
     energies: Mapping[str, MX]  # [J]
     rows: tuple[Constraint, ...]
-    indexes: Mapping[str, MX]
+    metrics: Mapping[str, MX]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -176,7 +176,7 @@ class Sequence(ABC):
 
     @abstractmethod
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
-        """Return objective, rows and indexes."""
+        """Return objective, rows and metrics."""
 
     @abstractmethod
     def signals(self, point: Any) -> Signals:
@@ -220,13 +220,13 @@ class Sequence(ABC):
             samples=samples,
             objectives={name: section.objective for name, section in assembled.items()},
             times=times,
-            energies={name: section.indexes[f"{name}_power_W"] * times[name] for name, section in assembled.items()},
+            energies={name: section.metrics[f"{name}_power_W"] * times[name] for name, section in assembled.items()},
             rows=tuple(row for section in assembled.values() for row in section.constraints),
-            indexes={key: value for section in assembled.values() for key, value in section.indexes.items()},
+            metrics={key: value for section in assembled.values() for key, value in section.metrics.items()},
         )
 
     def _assemble_section(self, section: MotionSection, point: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
-        """Assemble one section at its own point, with its name before those of its rows and indexes."""
+        """Assemble one section at its own point, with its name before those of its rows and metrics."""
         limits = {
             limit: point.positions[f"{section.kind}_{limit}"] for limit in BALANCE
         }  # a phase knows their plain names
@@ -236,7 +236,7 @@ class Sequence(ABC):
         return Assembly(
             objective=assembly.objective,
             constraints=tuple(replace(row, name=f"{section.name}_{row.name}") for row in assembly.constraints),
-            indexes={f"{section.name}_{key}": value for key, value in assembly.indexes.items()},
+            metrics={f"{section.name}_{key}": value for key, value in assembly.metrics.items()},
         )
 
     def rows_over_time(self) -> tuple[RowsOverTime, ...]:

@@ -20,7 +20,7 @@ from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter,
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body, Support, make_lift_variable
 from nlp_gait.gaits.biped.cycle import STEP, PhaseMotion, make_cycle_margins, make_planner
 from nlp_gait.gaits.biped.footholds import Flight, Foothold, list_feet
-from nlp_gait.gaits.biped.limits import BalanceMargins, RowsAndIndexes
+from nlp_gait.gaits.biped.limits import BalanceMargins, RowsAndMetrics
 from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase
@@ -106,7 +106,7 @@ class WholeWalk(PhaseSequence):
         return (*make_parameters(steps, *speeds), *bounds_last)
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
-        """Return energy per metre, rows and indexes."""
+        """Return energy per metre, rows and metrics."""
         sections = self.assemble_sections(point, ops)
         inner = point[STEPS] - HALF_STEPS
         often = {section.name: inner if section.name in TIMES else 1 for section in self.sections if section.occurs}
@@ -118,23 +118,23 @@ class WholeWalk(PhaseSequence):
         swings = [section for section in self.sections if section.kind is Support.SINGLE]
         advance = sum((compute_advance(swing) * often[swing.name] for swing in swings), MX(0))
         distance = advance * self._get_scale(point)
-        speeds, indexes = self._limit_speeds(point, sections.times, sections.energies)
+        speeds, metrics = self._limit_speeds(point, sections.times, sections.energies)
         return Assembly(
             objective=energy / distance,
             constraints=(*sections.rows, *speeds),
-            indexes={
+            metrics={
                 "energy_J": energy,
                 "distance_m": distance,
                 "duration_s": duration,
                 "energy_J_per_m": energy / distance,
-                **indexes,
-                **sections.indexes,
+                **metrics,
+                **sections.metrics,
             },
         )
 
-    def _limit_speeds(self, point: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
+    def _limit_speeds(self, point: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndMetrics:
         """Return rows of the inner steps: what both feet advance on average in a swing and the double support after it."""
-        rows, indexes = list[Constraint](), dict[str, MX]()
+        rows, metrics = list[Constraint](), dict[str, MX]()
         for prefix, pair in self.inner_steps.items():
             time, energy = (sum((values[section.name] for section in pair), MX(0)) for values in (times, energies))
             advance = compute_advance(pair[0]) * self._get_scale(point)
@@ -144,8 +144,8 @@ class WholeWalk(PhaseSequence):
             )
             rows.append(replace(row, over="once"))
             if self.equal:
-                indexes = {"speed_m_s": advance / time, "cycle_energy_J_per_m": energy / advance}
-        return rows, indexes
+                metrics = {"speed_m_s": advance / time, "cycle_energy_J_per_m": energy / advance}
+        return rows, metrics
 
     def limit_section(self, section: MotionSection) -> Phase:
         """Return the phase with the limits of a section: between given footholds, the ZMP is in the hull of both soles."""

@@ -14,7 +14,7 @@ from nlp_gait.formulation.assembly import Variable, make_labels
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Support, make_hip_variables, make_lift_variable, make_time_variable
 from nlp_gait.gaits.biped.cycle import STEP, WalkingCycle, make_cycle_margins, make_cycle_variables
-from nlp_gait.gaits.biped.limits import BalanceMargins, Limit, RowsAndIndexes, make_rows
+from nlp_gait.gaits.biped.limits import BalanceMargins, Limit, RowsAndMetrics, make_rows
 from nlp_gait.gaits.biped.loads import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_gait_problem, make_phase, make_phase_problem
@@ -37,7 +37,7 @@ class HipLimits(Limit):
         unique = {v.name: v for limits in variables for v in limits.values()}
         self.parameters = make_bound_parameters(tuple(unique.values()))
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         hip, rate = samples.hip, samples.hip_rate
         rows = []
         for end, limits, label in zip((0, hip.shape[1] - 1), self._variables, self._labels, strict=False):
@@ -61,7 +61,7 @@ class SwingLimits(Limit):
         self.parameters = (GROUND_TOLERANCE, *make_bound_parameters((lift,)))
         self._inner_edge = motion.body.support[1] - motion.body.robot.feet["left"].right_m
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         heights, sides, tolerance = samples.swing_heights, samples.sides, point[GROUND_TOLERANCE.name]
         inside = range(1, samples.steps)
         # Of the whole motion, not of the samples alone.
@@ -84,7 +84,7 @@ class StandingLimits(Limit):
 
     parameters = (GROUND_TOLERANCE,)
 
-    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         heights, ground, tolerance = (
             samples.swing_heights,
             samples.right_foot[:2, :],

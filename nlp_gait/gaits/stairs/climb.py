@@ -102,15 +102,15 @@ class Climb:
         blocks = {name: self.steps[name].layout.split(replace(point, x=x)) for name, x in self._split(point.x).items()}
         effort, energy, peak, rows = MX(0), MX(0), MX(0), list[Constraint]()
         for name, x in blocks.items():
-            objective, limits, indexes = self.steps[name].assemble(x, point)
+            objective, limits, metrics = self.steps[name].assemble(x, point)
             occurs = self.sequence.count(name)
             effort += occurs * objective
-            energy += occurs * indexes["energy_J"]
-            peak = ca.fmax(peak, indexes["peak_torque_Nm"])
+            energy += occurs * metrics["energy_J"]
+            peak = ca.fmax(peak, metrics["peak_torque_Nm"])
             rows += [replace(row, name=f"{name}_{row.name}") for row in limits]
         for before, after in JOINTS_BETWEEN:
             rows.append(self._join(before, after, blocks, point))
-        return Assembly(objective=effort, constraints=tuple(rows), indexes={"energy_J": energy, "peak_torque_Nm": peak})
+        return Assembly(objective=effort, constraints=tuple(rows), metrics={"energy_J": energy, "peak_torque_Nm": peak})
 
     def _join(self, before: str, after: str, blocks: Mapping[str, Mapping[str, MX]], point: Point) -> Constraint:
         """Return rows of equal places and speeds of hip and torso where a step meets the next one; the feet stand there."""

@@ -160,7 +160,7 @@ class ClimbStep:
         )
 
     def assemble(self, x: Mapping[str, MX], point: Point) -> tuple[MX, tuple[Constraint, ...], dict[str, MX]]:
-        """Return the effort, all rows, and indexes."""
+        """Return the effort, all rows, and metrics."""
         step = point["step_time_s"] / self.intervals
         torque, stance, pressure = self.compute_loads(x)
         effort = point["torque_weight"] * ca.sumsqr(torque)
@@ -175,11 +175,11 @@ class ClimbStep:
             stair.limit_stance_zmp(point, pressure),
             stair.limit_knees("knee", x["angle"]),
         )
-        indexes = {
+        metrics = {
             "energy_J": step * ca.sum1(ca.fabs(ca.vec(torque * rate))),
             "peak_torque_Nm": ca.norm_inf(ca.vec(torque)),
         }
-        return step * effort, rows, indexes
+        return step * effort, rows, metrics
 
     def refine(self, values: Mapping[str, Array], duration_s: float) -> StepMotion:
         """Return the step of the blocks' values on a fine grid."""

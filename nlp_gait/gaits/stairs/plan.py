@@ -179,7 +179,7 @@ def _assemble_phase(step: PlannedStep, phase: int, point: Point, fractions: MX, 
         clear = (*clear, stair.limit_shanks(step.shank_gaps(point, ops, grid), "next"))
     energy = (end - start) * ca.sum1(ca.sum2(ca.fabs(samples.power))) / fractions.shape[1]
     return Assembly(
-        objective=energy, constraints=(*_make_rows_at(point, samples, step), *clear), indexes={"energy_J": energy}
+        objective=energy, constraints=(*_make_rows_at(point, samples, step), *clear), metrics={"energy_J": energy}
     )
 
 
@@ -227,7 +227,7 @@ def _assemble(step: PlannedStep, minimise: Minimise, point: Point, ops: Nonsmoot
             *((stair.limit_shanks(step.shank_gaps(point, ops), "next"),) if step.shank_limits else ()),
             Constraint(name="phase_duration", labels=PHASES, unit="s", scale=0.1, value=durations, lower=least),
         ),
-        indexes={
+        metrics={
             "energy_J": step.energy(samples, exact),
             "peak_jerk_rad_s3": exact.largest(jerk),
             "peak_acceleration_rad_s2": exact.largest(ca.vec(DM(JOINT_RATES) @ samples.qdd)),

@@ -161,7 +161,7 @@ class TrackedStep:
         return Assembly(
             objective=tracking + effort + point["zmp_weight"] * -_compute_margin(zmp, rear, front, ops),
             constraints=tuple(constraints),
-            indexes={
+            metrics={
                 "controller_cost": ca.sum1(exact.abs(ca.vertcat(ca.vec(errors), ca.vec(power)))) / quanta,
                 "tracking_cost": ca.sum1(exact.abs(ca.vec(errors))) / quanta,
                 "energy_J": ca.sum1(exact.abs(ca.vec(power))) * closed_loop.QUANTUM,

@@ -54,7 +54,7 @@ def walk12(
     """Return the gait problem of the 12-joint biped: maximise lambda f1 / f1max + (1 - lambda) s / f2max.
 
     Args:
-        intervals: of a step, whose ends are the instants of the indexes and, every second one, of the reach; even.
+        intervals: of a step, whose ends are the instants of the metrics and, every second one, of the reach; even.
         horizon: Q over one step, as printed in (9), or over one second of walking, as Table IV implies.
         zmp: reading of the zero-moment point, see ``walk12_model.Zmp``.
         quadrature: of Q: Gauss's rule on 160 nodes, Simpson's on the intervals, or the paper's 10,000 Runge-Kutta steps.
@@ -100,7 +100,7 @@ class Walk12:
     robot: walk12_model.PointMassBiped
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
-        """Return the objective, the reach at the ends of Simpson's panels, and the indexes."""
+        """Return the objective, the reach at the ends of Simpson's panels, and the metrics."""
         T = point["step_time_s"]
         s = point["step_length_m"]
         zmp_at = _make_zmp_function(self.robot, ops, self.zmp)
@@ -116,20 +116,20 @@ class Walk12:
         q = SX.sym("q")
         f1 = ops.call(ca.Function("f1", [q], [1 / q]), Q)  # (eq. 10)
         f = point["lambda"] * f1 / point["f1max"] + (1 - point["lambda"]) * s / point["f2max_m"]  # (eq. 11)
-        indexes = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T)}
+        metrics = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T)}
         panels = self.intervals // 2  # of Simpson's rule, at whose ends the knees bend
         names = [f"{k / panels:g} T" for k in range(panels + 1)]
         reach = _limit_reach(point, self.robot, DM(np.linspace(0.0, 1.0, panels + 1)).T, names)
-        indexes |= _measure_stability(places, self.robot)
-        return Assembly(objective=f, constraints=(reach,), indexes=indexes)
+        metrics |= _measure_stability(places, self.robot)
+        return Assembly(objective=f, constraints=(reach,), metrics=metrics)
 
     def assemble_over_time(self, point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
         """Return the reach and the integrand's mean at phases (1, k)."""
         places = _sample_zmp(_make_zmp_function(self.robot, ops, self.zmp), point, phases)
         Q = point["step_time_s"] * ca.sum1(ca.sum2(places**2)) / phases.shape[1]
         reach = _limit_reach(point, self.robot, phases, [""] * phases.shape[1])
-        indexes = {"Q_m2s": Q} if self.horizon == "step" else {}
-        return Assembly(objective=MX(0), constraints=(reach,), indexes=indexes)
+        metrics = {"Q_m2s": Q} if self.horizon == "step" else {}
+        return Assembly(objective=MX(0), constraints=(reach,), metrics=metrics)
 
 
 def make_rule(quadrature: Quadrature, intervals: int) -> tuple[DM, DM]:

@@ -116,9 +116,9 @@ def _make_form(problem: GaitProblem, robot: Robot, phase: PowerPhase) -> PowerFo
             out.add_row(w - problem.upper[i] * z[-1], upper=0.0, pose=True)
             out.add_row(w - problem.lower[i] * z[-1], lower=0.0, pose=True)
     power = sum((weight * ca.fabs(out.expressions[term]) for term, _, _, weight in out.terms), SX(0))
-    indexes = {f"dbm_{axis}_mean_m": mean for axis, mean in means.items()}
-    indexes["torque_change_Nm"] = ca.mmax(ca.fabs(ca.vertcat(*changes)))
-    indexes["power_W"] = power / z[-1] + sum((loss * out.expressions[heat] for heat, loss in out.heats), SX(0))
+    metrics = {f"dbm_{axis}_mean_m": mean for axis, mean in means.items()}
+    metrics["torque_change_Nm"] = ca.mmax(ca.fabs(ca.vertcat(*changes)))
+    metrics["power_W"] = power / z[-1] + sum((loss * out.expressions[heat] for heat, loss in out.heats), SX(0))
     box = _make_box_of_z(problem)
     ranges = np.diff(box)[:, 0]
     poses = [out.expressions[out.rows[k][0]] for k in out.pose_rows]
@@ -135,7 +135,7 @@ def _make_form(problem: GaitProblem, robot: Robot, phase: PowerPhase) -> PowerFo
         ),
         poses=ca.Function("poses", [z], [ca.cse(ca.vertcat(*poses))]),
         pose_rows=np.array(out.pose_rows, dtype=np.int32),
-        indexes=ca.Function("indexes", [z], list(indexes.values()), ["z"], list(indexes)),
+        metrics=ca.Function("metrics", [z], list(metrics.values()), ["z"], list(metrics)),
     )
 
 

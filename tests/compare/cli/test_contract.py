@@ -27,7 +27,7 @@ def test_evaluate_prints_what_scripts_rely_on():
         "dbm_x_mean_m": 0.060437,
         "dbm_y_mean_m": 0.020754,
     }
-    assert result["indexes"] == pytest.approx(expected, abs=AGREEMENT)
+    assert result["metrics"] == pytest.approx(expected, abs=AGREEMENT)
     assert set(result["dense"]) == set(expected)
     assert result["feasible"] is True
     assert all(set(row) == {"name", "value", "lower", "upper", "violation", "unit"} for row in result["constraints"])
@@ -56,7 +56,7 @@ def test_unreachable_pose_is_evaluated_and_named():
     x = PSO_OF_THE_PAPER.replace("0.31,", "0.36,", 1)
     result = as_json("evaluate", "nao-ssp", "--x", x)
     assert not result["feasible"]
-    assert all(np.isfinite(value) for value in result["indexes"].values())
+    assert all(np.isfinite(value) for value in result["metrics"].values())
     out_of_reach = [
         row["name"] for row in result["constraints"] if row["name"].startswith("reach") and row["violation"] > 0
     ]
@@ -80,7 +80,7 @@ from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Objective, V
 def beam() -> GaitProblem:
     def assemble(at, ops):
         row = Constraint(name="area", unit="in^2", scale=1.0, value=at["h"] * at["l"], lower=0.5, upper=0.5)
-        return Assembly(objective=at["h"] + at["l"], constraints=(row,), indexes={})
+        return Assembly(objective=at["h"] + at["l"], constraints=(row,), metrics={})
 
     names = [Variable(name=name, unit="in", lower=0.1, upper=2.0, description=name) for name in "hl"]
     return GaitProblem(

@@ -47,8 +47,8 @@ def test_criteria_are_the_judges_numbers(name: str) -> None:
     objective = nlp_gait.compile_objective(problem)
     for margin in MARGINS:
         criterion = make_competing_objective(margin, problem)
-        assert criterion.evaluate(problem, x) == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
-        assert criterion.evaluate_many(objective, x[None])[0] == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
+        assert criterion.evaluate(problem, x) == pytest.approx(judged.metrics[f"{margin}_m"], rel=1e-9)
+        assert criterion.evaluate_many(objective, x[None])[0] == pytest.approx(judged.metrics[f"{margin}_m"], rel=1e-9)
     speed = make_competing_objective("speed", problem)
     way = 0.06 if name == "nao-ssp" else 0.04  # of the hip, Tables 3 and 5
     assert speed.evaluate(problem, x) == pytest.approx(way / x[-1])

@@ -40,9 +40,9 @@ def double_support(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_command_judges_simulates_and_compares_with_the_optimum(double_support: Path) -> None:
     pytest.importorskip("mujoco")
     found = as_json("evaluate", "--motion", double_support, "--robot", "nao-v5")
-    own, best = found["recorded"]["indexes"], found["optimum"]["indexes"]
+    own, best = found["recorded"]["metrics"], found["optimum"]["metrics"]
     planned = load("nao-dsp")
-    expected = as_json("evaluate", "nao-dsp", "--x", ",".join(map(str, DSP_X.values())))["indexes"]
+    expected = as_json("evaluate", "nao-dsp", "--x", ",".join(map(str, DSP_X.values())))["metrics"]
     assert found["gait"] == "nao-dsp" and found["step_m"] == pytest.approx(0.06, abs=1e-6)
     assert own["power_W"] == pytest.approx(expected["power_W"], rel=1e-4) and best["power_W"] < own["power_W"]
     assert found["optimum"]["x"]["double_support_time_s"] == pytest.approx(DSP_X["double_support_time_s"], abs=1e-6)

@@ -81,13 +81,13 @@ def test_gaits_of_a_walking_cycle_are_drawn_and_can_be_simulated(tmp_path: Path)
     problem = load("nao-cycle", objective="power", intervals=2)
     question = Sweep(problem=problem, axes=[parse_axis("speed_m_s=0.04")], starts=1)
     (point,) = find(question)
-    assert point.feasible and point.indexes["speed_m_s"] == pytest.approx(0.04)
-    assert point.indexes["cost_of_transport"] == pytest.approx(point.objective / (5.30535 * 9.8 * 0.04))
+    assert point.feasible and point.metrics["speed_m_s"] == pytest.approx(0.04)
+    assert point.metrics["cost_of_transport"] == pytest.approx(point.objective / (5.30535 * 9.8 * 0.04))
     lost = replace(point, at={"speed_m_s": 1.0}, feasible=False, status="in the way: step_length")
     question.report([point, lost]).write(tmp_path)
     rows = list(csv.DictReader((tmp_path / "nao-cycle-sweep-speed_m_s-ipopt.csv").read_text().splitlines()))
     assert [float(row["at.speed_m_s"]) for row in rows] == [0.04, 1.0]
-    assert rows[1]["feasible"] == "false" and float(rows[0]["indexes.step_length_m"]) > 0.0
+    assert rows[1]["feasible"] == "false" and float(rows[0]["metrics.step_length_m"]) > 0.0
     assert not (tmp_path / "nao-cycle-speed_m_s-1.json").exists()
     result = load_result(tmp_path / "nao-cycle-speed_m_s-0.04.json")
     assert result.problem.value("speed_m_s") == 0.04 and result.problem.by_name(result.x) == point.x

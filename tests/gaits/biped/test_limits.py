@@ -51,10 +51,10 @@ def make_samples() -> Samples:
 
 
 def test_a_torque_changes_over_an_interval_not_over_a_sample() -> None:
-    (row,), indexes = TorqueChange().add({"torque_change_limit_Nm": MX(1.2)}, make_samples(), Exact())
+    (row,), metrics = TorqueChange().add({"torque_change_limit_Nm": MX(1.2)}, make_samples(), Exact())
     assert numbers(row.value) == pytest.approx([3.0, -3.0, 5.0, -2.0, 7.0, -1.0])
     assert row.labels == ("a, 0", "b, 0", "a, 1", "b, 1", "a, 2", "b, 2")
-    assert numbers(indexes["torque_change_Nm"]) == pytest.approx([7.0])
+    assert numbers(metrics["torque_change_Nm"]) == pytest.approx([7.0])
 
 
 @pytest.mark.parametrize("name", GOALS)
@@ -62,9 +62,9 @@ def test_every_goal_by_hand(name: GoalName) -> None:
     assert set(OBJECTIVES) == set(GOALS) == set(get_args(GoalName)), (
         "add the goal to GoalName, and its value to OBJECTIVES"
     )
-    objective, indexes = GOALS[name].evaluate({"heat_loss_W_per_Nm2": MX(0.1)}, make_samples(), Exact())
+    objective, metrics = GOALS[name].evaluate({"heat_loss_W_per_Nm2": MX(0.1)}, make_samples(), Exact())
     assert numbers(objective) == pytest.approx([OBJECTIVES[name]])
-    assert numbers(indexes["power_W"]) == pytest.approx([OBJECTIVES["power"]])
+    assert numbers(metrics["power_W"]) == pytest.approx([OBJECTIVES["power"]])
 
 
 def test_margins_are_distances_to_the_edges_of_a_sole_that_is_not_symmetric() -> None:

@@ -32,7 +32,7 @@ def some(problem: GaitProblem, seed: int = 0) -> Array:
 def test_without_coefficients_the_motion_is_the_papers(name: str, order: str) -> None:
     problem = load(name, trajectory=order, samples_per_interval=1)
     rich, plain = evaluated(problem, padded(problem)), evaluated(load(name), PRINTED[name, "PSO"][0])
-    assert rich.indexes == pytest.approx(plain.indexes, rel=ROUNDING)
+    assert rich.metrics == pytest.approx(plain.metrics, rel=ROUNDING)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -82,7 +82,7 @@ def test_the_end_is_the_mirror_image_of_the_beginning_a_step_further(
     at_speed: GaitProblem, sampled: list[Sampled]
 ) -> None:
     for x, single, double in sampled:
-        step = evaluated(at_speed, x).indexes["step_length_m"]
+        step = evaluated(at_speed, x).metrics["step_length_m"]
         for name in ("q", "qd"):
             np.testing.assert_allclose(double.arrays[name][-1], mirrored_row(single, name, 0), rtol=0, atol=CONTINUITY)
         for end, start in (("hip", "hip"), ("left_foot", "right_foot"), ("right_foot", "left_foot")):
@@ -117,7 +117,7 @@ def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampl
         assert power == pytest.approx(energy / sum(times), rel=ROUNDING)
         per_metre = evaluated(free, np.append(x, step)).cost
         assert per_metre == pytest.approx(energy / step, rel=ROUNDING)
-        figures = evaluated(at_speed, x).indexes
+        figures = evaluated(at_speed, x).metrics
         assert figures["speed_m_s"] == pytest.approx(0.03, rel=ROUNDING)
         assert figures["energy_J_per_m"] == pytest.approx(energy / step, rel=ROUNDING)
         weight = load_robot("nao-v5").mass_kg * GRAVITY
@@ -126,7 +126,7 @@ def test_the_objective_is_the_energy_of_the_signals(at_speed: GaitProblem, sampl
 
 def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: list[Sampled]) -> None:
     x, single, double = sampled[0]
-    figures = evaluated(at_speed, x).indexes
+    figures = evaluated(at_speed, x).metrics
     touch_down = double.arrays["tau"][0] - single.arrays["tau"][-1]
     lift_off = mirrored_row(single, "tau", 0) - double.arrays["tau"][-1]
     assert figures["touch_down_torque_jump_Nm"] == pytest.approx(np.abs(touch_down).max(), rel=ROUNDING)

@@ -42,9 +42,9 @@ def evaluate(name: str, x: tuple[float, ...], **options: Any) -> ExactValues:
 @pytest.mark.parametrize(("name", "algorithm"), PRINTED)
 def test_printed_margins_follow_from_printed_solutions(name: str, algorithm: str) -> None:
     x, margins_mm = PRINTED[name, algorithm]
-    indexes = evaluate(name, x, **READING[name]).indexes
+    metrics = evaluate(name, x, **READING[name]).metrics
     for index, value_mm in margins_mm.items():
-        assert 1000.0 * indexes[index] == pytest.approx(value_mm, abs=0.2), index
+        assert 1000.0 * metrics[index] == pytest.approx(value_mm, abs=0.2), index
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_printed_margins_follow_from_printed_solutions(name: str, algorithm: str
 )
 def test_power_of_double_support_by_who_carries_the_arms(share: str, arms: str, power_W: float) -> None:
     x, _ = PRINTED["nao-dsp", "PSO"]
-    found = evaluate("nao-dsp", x, intervals=9, torso_share=share, arms=arms).indexes["power_W"]
+    found = evaluate("nao-dsp", x, intervals=9, torso_share=share, arms=arms).metrics["power_W"]
     assert found == pytest.approx(power_W, abs=0.001)
 
 

@@ -56,8 +56,8 @@ def test_a_planned_gait_that_is_read_back_gets_the_same_verdict(name: str, tmp_p
     assert gait.gait == name and not gait.motion.mirrored and gait.lean_deg < 1e-4
     own, before = judged(gait), evaluate(planned(name).problem, planned(name).x, prove=False)
     share = 20 * SHARE if name == "nao-cycle" else SHARE
-    for index, value in before.indexes.items():
-        assert own.indexes[index] == pytest.approx(value, rel=share, abs=share), index
+    for index, value in before.metrics.items():
+        assert own.metrics[index] == pytest.approx(value, rel=share, abs=share), index
     rows = {row.name: row.value for row in own.constraints}
     for row in before.constraints:
         if row.name.split("[")[0] in ("joint_angle", "torque_change", "dbm_x", "dbm_y", "dbm_x_mean", "dbm_y_mean"):
@@ -89,7 +89,7 @@ def test_a_motion_on_the_right_foot_is_its_mirror_image(tmp_path: Path) -> None:
     turned = JointAngles(owner="turned", joints=angles.joints, t=angles.t + 3.0, q=signs * angles.q[:, columns])
     gait, straight = make_recorded_gait(turned), make_recorded_gait(angles)
     assert gait.motion.mirrored and gait.gait == "nao-ssp"
-    assert judged(gait).indexes["power_W"] == pytest.approx(judged(straight).indexes["power_W"], rel=1e-9)
+    assert judged(gait).metrics["power_W"] == pytest.approx(judged(straight).metrics["power_W"], rel=1e-9)
 
 
 def test_torques_of_a_leaning_motion_are_pinocchios() -> None:
@@ -170,13 +170,13 @@ def test_phases_and_power_survive_rounding_and_noise(tmp_path: Path) -> None:
     angles = angles_of(written(tmp_path, "nao-cycle", 20))
     exact, noise = make_recorded_gait(angles), np.random.default_rng(0).normal(0.0, 5e-4, angles.q.shape)
     assert not exact.motion.noise_rad.any()
-    power = judged(exact).indexes["power_W"]
+    power = judged(exact).metrics["power_W"]
     for disturbed, error in ((angles.q.round(3), 2.9e-4), (angles.q + noise, 5e-4)):
         gait = make_recorded_gait(replace(angles, q=disturbed))
         assert gait.gait == "nao-cycle" and gait.inferred and gait.motion.repeats
         assert gait.x[0] == pytest.approx(exact.x[0], abs=0.03)
         assert gait.motion.noise_rad.max() == pytest.approx(error, rel=1.0)
-        assert judged(gait).indexes["power_W"] == pytest.approx(power, rel=0.1)
+        assert judged(gait).metrics["power_W"] == pytest.approx(power, rel=0.1)
 
 
 @pytest.mark.parametrize(("period_ms", "touch_down_s"), [(20, 2.2), (5, 2.2), (20, 2.205), (20, None)])
@@ -189,8 +189,8 @@ def test_noise_of_an_encoder_costs_no_power(period_ms: int, touch_down_s: float 
     noise = np.random.default_rng(0).normal(0.0, 2e-3, angles.q.shape)
     gait = make_recorded_gait(replace(angles, q=angles.q + noise), touch_down_s=touch_down_s)
     assert gait.x[0] == pytest.approx(2.2, abs=0.025)
-    assert judged(gait).indexes["power_W"] == pytest.approx(
-        evaluate(planned("nao-cycle").problem, planned("nao-cycle").x, prove=False).indexes["power_W"], rel=0.05
+    assert judged(gait).metrics["power_W"] == pytest.approx(
+        evaluate(planned("nao-cycle").problem, planned("nao-cycle").x, prove=False).metrics["power_W"], rel=0.05
     )
 
 

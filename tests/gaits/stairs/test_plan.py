@@ -91,7 +91,7 @@ def test_energy_is_the_integral_of_power() -> None:
     arrays = problem.signals(x).arrays
     t, power = (np.split(values, 4) for values in (arrays["t"], np.abs(arrays["power"]).sum(axis=1)))
     energy = sum(scipy.integrate.trapezoid(p, x=instants) for p, instants in zip(power, t, strict=True))
-    assert evaluate(problem, x).indexes["energy_J"] == pytest.approx(energy, rel=1e-12)
+    assert evaluate(problem, x).metrics["energy_J"] == pytest.approx(energy, rel=1e-12)
 
 
 PLAN = dict.fromkeys(StairPlan._fields, 0.1)

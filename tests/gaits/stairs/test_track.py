@@ -29,8 +29,8 @@ def problem() -> GaitProblem:
 def test_stiff_gains_follow_the_plan(problem: GaitProblem) -> None:
     found = evaluated(problem, [1000.0, 1000.0, 1.463])
     assert found.violation == 0.0
-    assert found.indexes["largest_error_rad"] < FOLLOWED_RAD
-    assert found.indexes["zmp_margin_min_m"] > 0.0
+    assert found.metrics["largest_error_rad"] < FOLLOWED_RAD
+    assert found.metrics["zmp_margin_min_m"] > 0.0
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
@@ -48,7 +48,7 @@ def test_the_zmp_limits_are_constraints(problem: GaitProblem) -> None:
     """At a torso pitch where the ZMP leaves the foot."""
     x = [100.0, 100.0, 1.6]
     found = evaluated(problem, x)
-    margin = found.indexes["zmp_margin_min_m"]
+    margin = found.metrics["zmp_margin_min_m"]
     assert margin < -1e-3
     assert found.violation > 0.0
     arrays = problem.signals(np.array(x)).arrays
@@ -80,7 +80,7 @@ def test_a_held_hip_is_followed_by_soft_legs_without_compensation() -> None:
         nlp_gait.load("stairs-track", base=base, duration_s=0.3).with_values(gravity_compensation=0.0)
         for base in ("hip", "stance-foot")
     )
-    soft, fallen = (evaluated(problem, [43.0, 5.0, 1.59]).indexes for problem in (held, standing))
+    soft, fallen = (evaluated(problem, [43.0, 5.0, 1.59]).metrics for problem in (held, standing))
     assert soft["largest_error_rad"] < 0.5 * fallen["largest_error_rad"]
     assert soft["peak_torque_Nm"] < 0.5 * fallen["peak_torque_Nm"]
 

@@ -97,7 +97,7 @@ def test_no_rule_but_simpsons_on_few_intervals_errs_where_legs_are_straight(x: l
 def test_f1_at_the_rows_of_table_4(step_time: float, x: list[float], per_step: float, per_second: float) -> None:
     for horizon, expected in (("step", per_step), ("1s", per_second)):
         problem = nlp_gait.load("walk12", intervals=400, horizon=horizon).with_values(step_time_s=step_time)
-        assert evaluated(problem, x).indexes["f1_per_m2s"] == pytest.approx(expected, abs=0.6)
+        assert evaluated(problem, x).metrics["f1_per_m2s"] == pytest.approx(expected, abs=0.6)
 
 
 def test_an_ankle_above_the_ground_shifts_the_zmp_by_the_horizontal_inertia() -> None:
