@@ -34,7 +34,7 @@ PROGRAMS = ("Rscript", "julia", "mkoctfile", "octave-cli", "pdflatex")
 
 # Processor time of tests that take longer than SLOW_S, a line for each function: that of its longest case [s].
 TIMES = Path(__file__).with_name("times.txt")
-SLOW_S, NIGHTLY_S = 0.25, 3.0
+SLOW_S, NIGHTLY_S = 0.25, 2.0
 BEGUN = pytest.StashKey[float]()
 measured: dict[str, float] = {}
 

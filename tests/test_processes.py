@@ -69,6 +69,7 @@ def square(number: int, send: Send) -> tuple[int, int]:
     return number * number, os.getpid()
 
 
+@pytest.mark.commit
 @pytest.mark.parametrize("alone", [False, True])
 @pytest.mark.parametrize("method", METHODS)
 def test_each_job_ends_in_its_own_way_and_the_others_return(method: str, alone: bool) -> None:

@@ -195,6 +195,7 @@ def check_page(opened: Visit, screen: str) -> None:
     assert (opened.messages, opened.requests) == ([], [])
 
 
+@pytest.mark.commit
 def test_the_page_fits_a_large_screen(opened: Visit, file: Path) -> None:
     assert file.stat().st_size < LARGEST_BYTES
     check_page(opened, "1280 light")

@@ -87,6 +87,7 @@ def test_example(
     plt.close("all")
 
 
+@pytest.mark.commit
 def test_a_paper_of_two_files_is_reproduced_by_the_command(tmp_path: Path) -> None:
     """From any folder that has both files, with its searches."""
     for name in ("your_own_paper.py", "your_own_paper.csv", "your_own_problem.py"):

@@ -94,13 +94,13 @@ def test_every_option_is_recorded(name: str) -> None:
 
 def test_the_judge_counts_the_intervals_of_its_grid() -> None:
     """With three samples an interval it needs 34 times as many to have at least 1,000."""
-    problem = load("nao-cycle", samples_per_interval=3)
+    problem = load("nao-ssp", samples_per_interval=3)
     middle = (problem.lower + problem.upper) / 2
     verdict = evaluate(load(problem.name, **problem.options), middle)
     dense = problem.dense(34)
     assert dense is not None
     assert verdict.dense_intervals == 34 * 30
-    assert len(dense.signals(middle).arrays["t"]) == 2 * verdict.dense_intervals + 1  # of each phase
+    assert len(dense.signals(middle).arrays["t"]) == verdict.dense_intervals + 1
     assert verdict.dense == evaluated(dense, middle).metrics
 
 

@@ -21,7 +21,7 @@ IDS = ("walk12-w015", "ssp-v5-time10")
 pytestmark = pytest.mark.skipif(not (shutil.which("c++") and shutil.which("cc")), reason="no C and C++ compiler")
 
 
-@pytest.fixture(scope="module", params=[IDS[0], pytest.param(IDS[1], marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=[IDS[0], pytest.param(IDS[1], marks=pytest.mark.nightly)])
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
     folder = tmp_path_factory.mktemp("c") / "out"
     export_objective(gaitbench.load(request.param), folder)

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.faults.processes import ROOT
 
 LOADED = (
@@ -26,6 +28,7 @@ CALLS = (
 )
 
 
+@pytest.mark.commit
 def test_no_file_of_the_working_folder_runs(tmp_path: Path) -> None:
     for name in LOADED:
         importlib.import_module(name)

@@ -217,6 +217,7 @@ def advance(run: SimulationRun, until_s: float) -> Array:
     return np.array(run.data.qpos)
 
 
+@pytest.mark.commit
 @pytest.mark.parametrize(("impulse_Ns", "share"), [((2.1, 0.0), 0.45), ((0.0, -1.8), 0.55)])
 def test_a_pushed_walk_stands_with_it_and_falls_without(
     plan: Plan, impulse_Ns: tuple[float, float], share: float

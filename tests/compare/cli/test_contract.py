@@ -33,6 +33,7 @@ def test_evaluate_prints_what_scripts_rely_on():
     assert all(set(row) == {"name", "value", "lower", "upper", "violation", "unit"} for row in result["constraints"])
 
 
+@pytest.mark.commit
 def test_solve_and_compare(tmp_path):
     solution = as_json("solve", "nao-ssp", "--starts", "1", "--seed", "0")
     named = "status claimed objective x iterations evaluations time_s active_constraints starts"

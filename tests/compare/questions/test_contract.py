@@ -124,6 +124,7 @@ def test_an_interrupted_question_continues_to_the_same_answer(
     assert {path: path.stat().st_mtime_ns for path in half} == half  # none is computed again
 
 
+@pytest.mark.commit
 @pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.line])
 def test_its_command_prints_the_answer(name: str, folder: Path) -> None:
     printed = as_json(*CASES[name].line, "--out", folder / name)

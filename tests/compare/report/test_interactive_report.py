@@ -131,6 +131,7 @@ def test_without_javascript_the_drawings_are_shown(browser: Any, report: Path) -
     context.close()
 
 
+@pytest.mark.commit
 @pytest.mark.parametrize("screen", SCREENS)
 def test_tables_sort(browser: Any, report: Path, screen: str) -> None:
     with visit(browser, report, screen) as opened:
