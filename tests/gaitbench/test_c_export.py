@@ -21,7 +21,10 @@ IDS = ("walk12-w015", "ssp-v5-time10")
 pytestmark = pytest.mark.skipif(not (shutil.which("c++") and shutil.which("cc")), reason="no C and C++ compiler")
 
 
-@pytest.fixture(scope="module", params=[IDS[0], pytest.param(IDS[1], marks=pytest.mark.nightly)])
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(IDS[0], marks=pytest.mark.commit), pytest.param(IDS[1], marks=pytest.mark.nightly)],
+)
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
     folder = tmp_path_factory.mktemp("c") / "out"
     export_objective(gaitbench.load(request.param), folder)

@@ -14,6 +14,7 @@ ID = "walk12-w015"
 EXAMPLE = Path(__file__).parents[3] / "examples" / "bring_your_own.py"
 
 
+@pytest.mark.commit
 def test_bench_ranks_a_user_algorithm(tmp_path: Path) -> None:
     """By ``file.py:name``, without glue; called again it runs nothing and says the same."""
     out = tmp_path / "out"
