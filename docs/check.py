@@ -30,7 +30,7 @@ LOADING = {
     "object": "data",
 }
 FEWEST_LETTERS = 100  # of a page; that of an animation has little text beside its figure
-ALIKE = 10  # pages of a folder whose accessibility is examined, which takes longest, each on one of the screens in turn
+ALIKE = 5  # pages of a folder whose accessibility is examined, which takes longest, each on one of the screens in turn
 
 
 class Page(HTMLParser):
