@@ -38,9 +38,8 @@ class Evaluation:
     #: Rows violated on the dense grid, worst first; times are samples of that grid
     dense_violations: tuple[ConstraintValue, ...]
     dense_intervals: int | None  #: number of intervals of the dense grid
-    guaranteed: (
-        Guarantee | None
-    )  #: what is proven between the samples; None for an infeasible point, or without ``prove``
+    #: What is proven between the samples; None for an infeasible point, or without ``prove``
+    guaranteed: Guarantee | None
 
     @property
     def violations(self) -> tuple[ConstraintValue, ...]:

@@ -38,9 +38,8 @@ class Biped:
     model: Robot  # with the joints of the legs only, all others held in the posture
     legs: Mapping[str, Leg]  # ``"left"`` and ``"right"``
     posture_rad: Mapping[str, float]  # angles of the held joints
-    differences: tuple[
-        str, ...
-    ]  # of both sides, see ``find_differences``; none if a step and its mirror image are alike
+    # Differences of both sides, see ``find_differences``; none if a step and its mirror image are alike.
+    differences: tuple[str, ...]
 
     @property
     def joints(self) -> tuple[str, ...]:

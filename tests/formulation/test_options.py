@@ -42,10 +42,8 @@ OTHER: dict[str, Any] = {
 }
 
 
-STAIRS = {
-    "stair_rise_m": 0.02,
-    "stair_run_m": 0.2,
-}  # both or none, and on the level: tested by themselves, as footholds are
+# Both or none, and on the level: tested by themselves, as footholds are.
+STAIRS = {"stair_rise_m": 0.02, "stair_run_m": 0.2}
 
 
 def defaults(name: str) -> dict[str, Any]:

@@ -19,9 +19,8 @@ from nlp_gait.gaitbench.facts import Facts
 PAGE = Path(__file__).parents[2] / "docs" / "gaitbench.md"
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
 IMPORT = re.compile(r"^(?:import|from) (\w+)", re.MULTILINE)
-READY = [
-    block for block in BLOCKS if all(map(find_spec, IMPORT.findall(block)))
-]  # with the extra algorithms all of them
+# With the extra algorithms all of them.
+READY = [block for block in BLOCKS if all(map(find_spec, IMPORT.findall(block)))]
 
 
 def _compute_by_one_start(compute: Callable[..., Facts], instance: gaitbench.Instance, starts: int) -> Facts:

@@ -77,9 +77,10 @@ def test_a_program_may_leave_a_process_behind_that_holds_its_output() -> None:
         ("exit 3", "status 3: no message"),
         ("echo oh dear >&2; exit 1", "status 1: oh dear"),
         ("kill -9 $$", "status -9"),
+        # It is waited for.
         pytest.param(
-            "sleep 30", "sent nothing for 0.5 s: it has not sent its first line.*in Octave", marks=pytest.mark.slow
-        ),  # it is waited for
+            "sleep 30", "sent nothing for 0.5 s: it has not sent its first.*in Octave", marks=pytest.mark.slow
+        ),
         ("echo hello", "neither"),
         ("""printf '{"x": [[0.1,'""", "neither"),
         ("""printf '{"x": [[1, 2, 3]]}\\n'""", r"\(P, 2\)"),

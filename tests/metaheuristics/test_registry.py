@@ -28,10 +28,7 @@ from metaheuristics import (
 )
 from metaheuristics.adapters.cma import CmaEs
 from metaheuristics.adapters.pymoo import MODULES, Pymoo
-from metaheuristics.algorithms.differential_evolution import (
-    STRATEGIES,
-    DifferentialEvolution,
-)
+from metaheuristics.algorithms.differential_evolution import STRATEGIES, DifferentialEvolution
 from metaheuristics.algorithms.genetic import GoswamiGeneticAlgorithm
 from metaheuristics.interface import FEASIBILITY, Array, Start
 from tests.metaheuristics.problems import disc, sphere

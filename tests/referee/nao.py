@@ -63,9 +63,8 @@ def single_support(X: Array, robot: Mapping[str, Any], reading: Reading = Readin
     x1, x2, x3, x4, x5, x6, x7, x8, x9 = X.T[:, None, :]
     T = np.broadcast_to(x9, (reading.samples, len(X)))
     t = time(np.linspace(0.0, 1.0, reading.samples)[:, None] * x9, 2)
-    hip = stack(
-        [cubic(t, T, (0.03, 0.09), (x4, x5)), cubic(t, T, (0.025, 0.025), (x6, x7)), cubic(t, T, (x1, x1), (x2, x3))]
-    )  # Table 3, rows 3 to 5
+    along, across, up = ((0.03, 0.09), (x4, x5)), ((0.025, 0.025), (x6, x7)), ((x1, x1), (x2, x3))
+    hip = stack([cubic(t, T, *ends) for ends in (along, across, up)])  # Table 3, rows 3 to 5
     along = cubic(t, T, (0.0, 0.12), (0.0, 0.0))  # row 1
     away = (along - 0.06) / 0.06
     swing = stack([along, -0.05, x8 * (1.0 - away * away)])  # row 2
@@ -83,9 +82,8 @@ def double_support(X: Array, robot: Mapping[str, Any], reading: Reading = Readin
     x1, x2, x3, x4, x5, x6, x7, x8 = X.T[:, None, :]
     T = np.broadcast_to(x8, (reading.samples, len(X)))
     t = time(np.linspace(0.0, 1.0, reading.samples)[:, None] * x8, 2)
-    hip = stack(
-        [cubic(t, T, (0.07, 0.11), (x4, x5)), cubic(t, T, (0.025, -0.025), (x6, x7)), cubic(t, T, (x1, x1), (x2, x3))]
-    )  # Table 5
+    along, across, up = ((0.07, 0.11), (x4, x5)), ((0.025, -0.025), (x6, x7)), ((x1, x1), (x2, x3))
+    hip = stack([cubic(t, T, *ends) for ends in (along, across, up)])  # Table 5
     arms = {"L": ((1.0, 1.5), (-0.64, -0.50)), "R": ((2.0, 1.5), (0.42, 0.50))}
     feet = {side: t.like(0.0) + _column(foot) for side, foot in (("L", STANCE), ("R", LANDED))}
     angles, reach = _posture(t, T, hip, feet, arms)

@@ -93,15 +93,9 @@ def _planned(phase: int, t: Array, ends: Array, x: Mapping[str, Array], run: flo
             p3 = p4 - CATCH * np.array([wide * (1.0 - np.cos(caught)), radius * np.sin(caught)])[:, None, None]
             b = u * u * (2.0 - u)  # no jump of the velocity at either end
             rest = 1.0 - b
-            ankle = stack(
-                [
-                    rest * rest * rest * p1[k]
-                    + 3.0 * rest * rest * b * p2[k]
-                    + 3.0 * rest * b * b * p3[k]
-                    + b * b * b * p4[k]
-                    for k in range(2)
-                ]
-            )  # (10), (11) with the binomial factors
+            # (10), (11) with the binomial factors.
+            weights = rest * rest * rest, 3.0 * rest * rest * b, 3.0 * rest * b * b, b * b * b
+            ankle = stack([sum(w * p[k] for w, p in zip(weights, (p1, p2, p3, p4), strict=True)) for k in range(2)])
             straight = smooth
         else:
             span = ends[4] - ends[3]

@@ -11,7 +11,7 @@ pytest.importorskip("mujoco")
 from nlp_gait.formulation import Signals, make_vector_columns  # noqa: E402
 from nlp_gait.robots import load_robot  # noqa: E402
 from nlp_gait.simulation.drive import Drive  # noqa: E402
-from nlp_gait.simulation.measurements import average_pressure, measure  # noqa: E402
+from nlp_gait.simulation.measurements import _measure_walked_distance, average_pressure, measure  # noqa: E402
 from nlp_gait.simulation.plan import Plan  # noqa: E402
 from nlp_gait.simulation.simulate import Simulation  # noqa: E402
 
@@ -156,6 +156,22 @@ def test_where_no_foot_stands_throughout_slip_is_that_of_each_support() -> None:
     )
     paths[200:900, 1, 0] -= 0.015
     assert measure(walking, replace(trace, feet=paths), Drive()).slip_m == pytest.approx(0.010, abs=3e-4)
+
+
+def test_distance_is_along_the_planned_way_and_to_its_left() -> None:
+    feet = np.zeros((2, 2, 3))
+    feet[1, :, :2] = 0.5, 1.0  # both feet
+    assert _measure_walked_distance(traced(feet=feet), (3.0, 4.0)) == pytest.approx((1.1, 0.2))
+
+
+def test_the_planned_attitude_is_that_of_the_nearest_sample() -> None:
+    plan = planned()
+    half = 0.1 * plan.signals.arrays["t"] / 2
+    leaning = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
+    arrays = {**plan.signals.arrays, "attitude": leaning}
+    columns = {**plan.signals.columns, "attitude": make_vector_columns("1", "wxyz")}
+    turned = replace(plan, signals=replace(plan.signals, arrays=arrays, columns=columns))
+    assert turned.heading(np.array([0.304, 0.306, 2.0])) == pytest.approx([0.03, 0.031, 0.1])
 
 
 def test_pressure_is_compared_with_the_plan() -> None:

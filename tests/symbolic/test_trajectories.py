@@ -12,6 +12,8 @@ from nlp_gait.symbolic.trajectories import (
     basis,
     constant_motion,
     count_coefficients,
+    cubic,
+    cubic_of_sums,
     map_motion,
     parabola_lift,
     spline,
@@ -41,6 +43,12 @@ def test_a_function_of_a_motion_by_the_chain_rule() -> None:
     assert velocity == pytest.approx([2 * 2 * 3 * 1 + 4 * -1, -cos])
     # a^2 b: 2 (a'^2 + a a'') b + 4 a a' b' + a^2 b''
     assert acceleration == pytest.approx([2 * (9 + 20) * 1 + 4 * 2 * 3 * -1 + 4 * 1, cos - sin])
+
+
+def test_a_cubic_of_sums_of_velocities_is_the_cubic_over_unit_time() -> None:
+    expected = cubic(SX(1.0), SX(3.0), SX(0.7), SX(-0.4), SX(1.0), SX(0.3))
+    found = cubic_of_sums(1.0, 3.0, SX(0.15), SX(0.55), SX(0.3))
+    assert [float(part) for part in found] == pytest.approx([float(part) for part in expected])
 
 
 def test_a_path_off_the_origin_is_lifted_between_its_own_ends() -> None:

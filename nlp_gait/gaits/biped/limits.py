@@ -37,9 +37,8 @@ class Limit(ABC):
     """What limits a phase; a subclass overrides what it needs."""
 
     parameters: tuple[Parameter, ...] = ()  # of the limit, which can be changed without rebuilding
-    reads: tuple[
-        Quantity, ...
-    ] = ()  # of the samples, evaluated with those of every phase; others take an evaluation more
+    # Quantities of the samples that are evaluated with those of every phase; any other takes an evaluation more.
+    reads: tuple[Quantity, ...] = ()
 
     @abstractmethod
     def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:

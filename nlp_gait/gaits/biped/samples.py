@@ -109,24 +109,22 @@ class Samples:
     wrench_right = Quantity(lambda _, now: now.wrenches["R"])  #: (6, N + 1)
     hip = Quantity(lambda _, now: now.hip, of_motion=True)  #: (3, N + 1) torso's origin in the world [m]
     com = Quantity(_locate_mass, of_motion=True)  #: (3, N + 1) centre of mass [m]
-    left_foot = Quantity(
-        lambda phase, now: _locate_sole(phase, now, "L"), of_motion=True
-    )  #: (3, N + 1) below the ankle
-    right_foot = Quantity(lambda phase, now: _locate_sole(phase, now, "R"), of_motion=True)  #: (3, N + 1)
+    #: (3, N + 1) points of flat soles below the ankles [m]
+    left_foot = Quantity(lambda phase, now: _locate_sole(phase, now, "L"), of_motion=True)
+    right_foot = Quantity(lambda phase, now: _locate_sole(phase, now, "R"), of_motion=True)  #: likewise
     #: (1, N + 1) height of the right sole above the left one [m]; of a sole that may tilt (4, N + 1), of its ``CORNERS``
     swing_heights = Quantity(
         lambda phase, now: now.heights if now.heights.numel() else _locate_sole(phase, now, "R")[2], of_motion=True
     )
-    sides = Quantity(
-        lambda _, now: now.sides, of_motion=True
-    )  #: (2, N + 1) y of the left corners of a sole that may tilt
-    hip_rate = Quantity(lambda _, now: now.hip_rate)  #: (3, N + 1) velocity of the torso's origin, of recorded motions
-    arm_angle = Quantity(
-        lambda _, now: now.arm_angle, of_motion=True
-    )  #: (k, N + 1) angles of the arms that swing [rad]
-    attitude = Quantity(
-        lambda _, now: now.attitude, of_motion=True
-    )  #: (4, N + 1) of the torso; empty where it is upright
+    #: (2, N + 1) y of the left corners of a sole that may tilt [m]
+    sides = Quantity(lambda _, now: now.sides, of_motion=True)
+    hip_rate = Quantity(
+        lambda _, now: now.hip_rate
+    )  #: (3, N + 1) velocity of the torso's origin [m/s], of recorded motions
+    #: (k, N + 1) angles of the arms that swing [rad]
+    arm_angle = Quantity(lambda _, now: now.arm_angle, of_motion=True)
+    #: (4, N + 1) attitude of the torso, a unit quaternion (w, x, y, z); empty where it is upright
+    attitude = Quantity(lambda _, now: now.attitude, of_motion=True)
     yaw = Quantity(lambda _, now: now.yaw, of_motion=True)  #: (1, N + 1) of the right foot [rad]; empty without a turn
 
     if not TYPE_CHECKING:  # a type checker finds unknown names

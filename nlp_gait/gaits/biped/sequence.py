@@ -227,9 +227,8 @@ class Sequence(ABC):
 
     def _assemble_section(self, section: MotionSection, point: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
         """Assemble one section at its own point, with its name before those of its rows and metrics."""
-        limits = {
-            limit: point.positions[f"{section.kind}_{limit}"] for limit in BALANCE
-        }  # a phase knows their plain names
+        # A phase knows their plain names.
+        limits = {limit: point.positions[f"{section.kind}_{limit}"] for limit in BALANCE}
         assembly = self.limit_section(section).assemble(
             replace(point, positions={**point.positions, **limits}), ops, samples
         )

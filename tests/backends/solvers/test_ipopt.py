@@ -195,7 +195,6 @@ def test_the_usual_widths_end_at_the_gait_of_narrower_ones(margin_m: float, comp
     for outcome in usual.starts:
         assert outcome.cost <= min(wide.objective, narrow.objective) * (1 + 5e-4)
     guess = usual.best.guess
-    assert guess is not None and guess.width == (
-        5e-4 if margin_m == 0.05 else 2e-5
-    )  # no stage more than the gait needs
+    # No stage more than the gait needs.
+    assert guess is not None and guess.width == (5e-4 if margin_m == 0.05 else 2e-5)
     assert usual.objective == pytest.approx(0.845869 if margin_m == 0.05 else 0.849248, rel=1e-6)

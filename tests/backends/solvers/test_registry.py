@@ -19,7 +19,7 @@ from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.interrupts import never
-from tests.backends.toys import corner, toy
+from tests.backends.toys import corner, row, toy
 
 # Of the objective of the toy: SLSQP differentiates by differences.
 TOLERANCE = 1e-5
@@ -87,3 +87,10 @@ def test_unknown_names_and_settings_are_refused() -> None:
         make_solver("ipopt", tolerance="small")
     with pytest.raises(InputError, match="slsqp needs at least 3 evaluations"):
         solve(toy(corner), solver=make_solver("slsqp", evaluations=2))
+
+
+def test_slsqp_ends_where_a_circle_meets_a_line() -> None:
+    """The point of x + y <= 2 nearest to (1, 2)."""
+    problem = toy(lambda x, y, limit, ops: ((x - 1) ** 2 + (y - 2) ** 2, (row(x + y, upper=limit),)), limit=2.0)
+    found = solve(problem, x0=[-1.5, 0.0], solver=make_solver("slsqp"))
+    assert found.x == pytest.approx({"x": 0.5, "y": 1.5}, abs=1e-6)

@@ -95,6 +95,10 @@ def test_a_drawn_sole_reaches_as_far_to_each_side_as_the_foot(side: str) -> None
     ends = [foot.front_m, foot.back_m, foot.left_m, foot.right_m]
     x, y = sole.corners[0, :, 0], sole.corners[0, :, 1]
     assert [x.max(), -x.min(), y.max(), -y.min()] == pytest.approx(ends)
+    turned = make_level_sole(
+        replace(robot, feet={**robot.feet, side: foot}), side, np.zeros((1, 3)), np.array([np.pi / 2])
+    )
+    assert turned.corners[0, :, :2] == pytest.approx(np.stack([-y, x], axis=1))
 
 
 def test_a_sole_stands_in_the_middle_of_its_tread() -> None:

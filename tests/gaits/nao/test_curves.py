@@ -61,13 +61,3 @@ def test_what_only_a_spline_can_break_is_a_limit(curve: str, value: float, row: 
     assert not row_violations(problem, x)
     x[[problem.variable_index(f"{curve}[{k}]") for k in range(2)]] = value
     assert any(found.name.startswith(row) for found in row_violations(problem, x))
-
-
-@pytest.mark.parametrize(("name", "signal"), [("jerk", "qdd"), ("torque-smoothness", "tau")])
-def test_smoothness_is_the_mean_square_of_differences_of_signals(name: str, signal: str) -> None:
-    problem = load("nao-ssp", objective=name)
-    assert name != "jerk" or (problem.objective.name, problem.objective.unit) == ("joint_jerk", "rad^2/s^6")
-    arrays = problem.signals(padded(problem)).arrays
-    rates = np.diff(arrays[signal], axis=0) / np.diff(arrays["t"])[:, None]
-    cost = evaluated(problem, padded(problem)).cost
-    assert cost == pytest.approx((rates**2).sum(axis=1).mean(), rel=1e-9)

@@ -96,11 +96,8 @@ def test_torques_of_a_leaning_motion_are_pinocchios() -> None:
     """Every joint moves, the torso leans; nothing of it is planned."""
     rng, t = np.random.default_rng(3), np.linspace(0.0, 1.2, 60)
     base = angles_of_stance()
-    base[[JOINTS.index(f"R{name}") for name in ("HipPitch", "KneePitch", "AnklePitch")]] += (
-        -0.6,
-        1.2,
-        -0.6,
-    )  # in the air
+    lifted = {"RHipPitch": -0.6, "RKneePitch": 1.2, "RAnklePitch": -0.6}  # in the air
+    base[[JOINTS.index(name) for name in lifted]] += list(lifted.values())
     waves = 0.1 * np.sin(np.outer(t, rng.uniform(2.0, 5.0, len(JOINTS))) + rng.uniform(0, 6, len(JOINTS)))
     gait = make_recorded_gait(JointAngles(owner="waves", joints=JOINTS, t=t, q=base + waves), gait="nao-ssp")
     assert gait.lean_deg > 1.0

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 import scipy.integrate
-from casadi import SX
+from casadi import DM, MX, SX
 
 import nlp_gait
 from compare.judge import evaluate
@@ -14,9 +14,9 @@ from compare.papers.stairs.printed import TABLE_3, TABLE_4
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
-from nlp_gait.gaits.stairs.planar_biped import GRAVITY, load_toe_foot_biped
-from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, locate_hip, move_in_time
-from nlp_gait.gaits.stairs.stair import PAPER_TIMES
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, MOVING, load_toe_foot_biped
+from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, locate_ankle, locate_hip, move_in_time
+from nlp_gait.gaits.stairs.stair import PAPER_TIMES, limit_knees
 from nlp_gait.simulation.plan import make_plan
 from tests.evaluation import evaluated
 
@@ -115,6 +115,20 @@ def test_the_hip_is_a_pendulum_over_the_planned_zmp(phase: int, speed: float) ->
     assert acceleration == pytest.approx(GRAVITY / PLAN["hip_height"] * (x - zmp), rel=1e-9, abs=1e-9)
     ends = [float(at([end] * 4, [0] * 4)[0]) for end in (0, 1)]
     assert ends == pytest.approx([PLAN["hip_start"], PLAN["hip_start"] + TREAD_M], abs=1e-12)
+
+
+def test_the_ankle_goes_on_from_the_bridge_to_the_cycloid_with_one_velocity() -> None:
+    plan, s, h = StairPlan(**{k: SX(v) for k, v in {**PLAN, **TIMES}.items()}), SX.sym("s", 4), 1e-6
+    ankle = ca.Function("ankle", [s], [locate_ankle(plan, Stair(SX(TREAD_M), SX(RISE_M)), s)])
+    before, at, after = (np.array(ankle([1, 1, *ends])).ravel() for ends in ((1 - h, 0), (1, 0), (1, h)))
+    bridge, track = (float(duration) for duration in ca.vertsplit(plan.durations)[2:])
+    assert (at - before) / bridge == pytest.approx((after - at) / track, rel=1e-4)
+
+
+def test_a_knee_is_its_shank_less_its_thigh() -> None:
+    q = {link: float(k**2) for k, link in enumerate(MOVING)}
+    knees = np.array(ca.evalf(limit_knees("knee_angle", MX(DM(list(q.values())))).value)).ravel()
+    assert knees.tolist() == [q["KA"] - q["HK"], q["K'A'"] - q["HK'"]]
 
 
 TREAD, RISE = 0.254, 0.254 * 0.70

@@ -1,11 +1,15 @@
 """The closed loop: finite at every gain, honest about standing still, and one optimum for search and multiple shooting."""
 
+import casadi as ca
 import numpy as np
 import pytest
+from casadi import DM, MX
 
 import nlp_gait
 from metaheuristics import AntColony, minimize
 from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaits.stairs.track import _compute_margin
+from nlp_gait.symbolic.nonsmooth import Exact
 from tests.evaluation import evaluated
 
 # Stiff gains follow the plan of case 2 within 0.05 rad.
@@ -42,6 +46,11 @@ def test_finite_at_every_gain(problem: GaitProblem, share: float) -> None:
     assert f.max() < LARGEST_COST
     assert np.isfinite(violation).all()
     assert (violation[X[:, 1] == 0.0] > 0.0).all()
+
+
+def test_the_margin_is_the_least_distance_from_both_ends() -> None:
+    zmp, rear, front = (MX(DM(values)) for values in ([0.02, 0.05], [-0.1, 0.0], [0.12, 0.12]))
+    assert float(ca.evalf(_compute_margin(zmp, rear, front, Exact()))) == pytest.approx(0.05)
 
 
 def test_the_zmp_limits_are_constraints(problem: GaitProblem) -> None:
