@@ -160,8 +160,8 @@ def test_where_no_foot_stands_throughout_slip_is_that_of_each_support() -> None:
 
 def test_distance_is_along_the_planned_way_and_to_its_left() -> None:
     feet = np.zeros((2, 2, 3))
-    feet[1, :, :2] = 0.5, 1.0  # both feet
-    assert _measure_walked_distance(traced(feet=feet), (3.0, 4.0)) == pytest.approx((1.1, 0.2))
+    feet[1, :, :2] = 0.5, 2.0  # both feet
+    assert _measure_walked_distance(traced(feet=feet), (3.0, 4.0)) == pytest.approx((1.9, 0.8))
 
 
 def test_the_planned_attitude_is_that_of_the_nearest_sample() -> None:

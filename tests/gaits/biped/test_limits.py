@@ -91,14 +91,13 @@ def test_the_box_around_both_soles_ends_at_their_outer_edges() -> None:
 def test_a_drawn_sole_reaches_as_far_to_each_side_as_the_foot(side: str) -> None:
     robot = load_robot("nao-v5")
     foot = replace(robot.feet[side], **WIDTHS[side])
-    sole = make_level_sole(replace(robot, feet={**robot.feet, side: foot}), side, np.zeros((1, 3)))
+    robot = replace(robot, feet={**robot.feet, side: foot})
+    sole = make_level_sole(robot, side, np.zeros((1, 3)))
     ends = [foot.front_m, foot.back_m, foot.left_m, foot.right_m]
     x, y = sole.corners[0, :, 0], sole.corners[0, :, 1]
     assert [x.max(), -x.min(), y.max(), -y.min()] == pytest.approx(ends)
-    turned = make_level_sole(
-        replace(robot, feet={**robot.feet, side: foot}), side, np.zeros((1, 3)), np.array([np.pi / 2])
-    )
-    assert turned.corners[0, :, :2] == pytest.approx(np.stack([-y, x], axis=1))
+    (turned,) = make_level_sole(robot, side, np.zeros((1, 3)), np.array([0.3])).corners
+    assert turned[:, 0] + 1j * turned[:, 1] == pytest.approx(np.exp(0.3j) * (x + 1j * y))
 
 
 def test_a_sole_stands_in_the_middle_of_its_tread() -> None:
