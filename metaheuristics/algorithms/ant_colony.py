@@ -138,8 +138,7 @@ def pick(probability: Array, u: Array) -> NDArray[np.intp]:
     """Return the levels (P, n), 0..L-1, that random numbers u (P, n) in [0, 1) pick by weights (n, L)."""
     cumulative = np.cumsum(probability, axis=1)
     passed = cumulative <= (u * cumulative[:, -1])[:, :, None]
-    last = probability.shape[1] - 1  # the limit, as rounding may let u times the total reach the total
-    levels: NDArray[np.intp] = np.minimum(passed.sum(axis=2), last)
+    levels: NDArray[np.intp] = passed.sum(axis=2)  # below L, for u times the total is rounded to less than the total
     return levels
 
 

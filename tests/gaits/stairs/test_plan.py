@@ -131,9 +131,6 @@ def test_a_knee_is_its_shank_less_its_thigh() -> None:
     assert knees.tolist() == [q["KA"] - q["HK"], q["K'A'"] - q["HK'"]]
 
 
-TREAD, RISE = 0.254, 0.254 * 0.70
-
-
 def test_feet_alternate_from_the_floor_to_the_last_stair() -> None:
     problem = nlp_gait.load("stairs-climb", stairs=3, intervals=12)
     plan = make_plan(Result(problem=problem, x=problem.start_point(np.random.default_rng(1))))
@@ -141,9 +138,9 @@ def test_feet_alternate_from_the_floor_to_the_last_stair() -> None:
     feet = {side: plan.at(f"{side}_foot", steps) for side in ("left", "right")}
     for side, levels in (("left", [0, 0, 2, 2, 3]), ("right", [0, 1, 1, 3, 3])):
         # A start point has noise: the swing foot lands centimetres off.
-        np.testing.assert_allclose(feet[side][:, 0], np.multiply(TREAD, levels), atol=0.06)
-        np.testing.assert_allclose(feet[side][:, 2], np.multiply(RISE, levels), atol=0.06)
-    assert [tread.height_m for tread in plan.ground] == pytest.approx([RISE, 2 * RISE, 3 * RISE])
+        np.testing.assert_allclose(feet[side][:, 0], np.multiply(TREAD_M, levels), atol=0.06)
+        np.testing.assert_allclose(feet[side][:, 2], np.multiply(RISE_M, levels), atol=0.06)
+    assert [tread.height_m for tread in plan.ground] == pytest.approx([RISE_M, 2 * RISE_M, 3 * RISE_M])
 
 
 def test_the_effort_counts_every_step_and_no_step_is_computed_twice() -> None:
