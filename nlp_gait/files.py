@@ -55,7 +55,7 @@ def make_file_name(name: str) -> str:
 def read_bytes(
     path: Path, what: str, *, error: type[GaitError] = InputError, at_most: int = LARGEST_FILE, remedy: str = ""
 ) -> bytes:
-    """Return the content of a regular file of at most so many bytes, or of a link to one.
+    """Return the content of a regular file of at most ``at_most`` bytes, or of a link to one.
 
     Raises ``error`` if that is impossible; its message contains ``what``, the kind of file, and ends with ``remedy``.
     """

@@ -19,7 +19,7 @@ class Interrupted(KeyboardInterrupt):
     """Ctrl-C, with the partial result; it propagates as every KeyboardInterrupt does."""
 
     def __init__(self, sentence: str, partial: object) -> None:
-        super().__init__(sentence, partial)  # both, else it cannot be pickled
+        super().__init__(sentence, partial)  # both, otherwise it cannot be pickled
         self.sentence = sentence  # how far the work had come
         self.partial = partial  # may be empty
 

@@ -230,6 +230,6 @@ def run_in_forks(
 
 
 def kill_children() -> None:
-    """Kill workers that have begun; else each would print a traceback when it finds that this process has ended."""
+    """Kill workers that have begun; otherwise each would print a traceback when it finds that this process has ended."""
     for child in multiprocessing.active_children():
         child.kill()

@@ -1,7 +1,6 @@
 """Limits that a user adds: every one on every kind of phase, and against values by hand and MuJoCo."""
 
 import pickle
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.errors import GaitError
-from nlp_gait.formulation import GaitProblem, Grid
+from nlp_gait.formulation import Grid
 from nlp_gait.limits import LIMITS, FootClearance, FrictionCone, Limit, Point, Samples, make_rows_at_samples
 from nlp_gait.proofs.guarantee import guarantee
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -36,24 +35,12 @@ def test_the_rows_of_every_limit_are_tested() -> None:
     assert set(ROWS) == set(LIMITS), "add to ROWS how the names of a limit's rows begin, and test its values by hand"
 
 
-@pytest.fixture(scope="module")
-def problems() -> Callable[[str], GaitProblem]:
-    made: dict[str, GaitProblem] = {}
-
-    def load(name: str) -> GaitProblem:
-        if name not in made:
-            made[name] = nlp_gait.load(name, intervals=4, limits=",".join(LIMITS))
-        return made[name]
-
-    return load
-
-
 @pytest.mark.parametrize(
     "name",
     ["nao-ssp", "nao-dsp", "nao-cycle", "humanoid-dsp", pytest.param("humanoid-walk", marks=pytest.mark.slow)],
 )
-def test_every_limit_has_rows_in_every_kind_of_phase(problems: Callable[[str], GaitProblem], name: str) -> None:
-    problem = problems(name)
+def test_every_limit_has_rows_in_every_kind_of_phase(name: str) -> None:
+    problem = nlp_gait.load(name, intervals=4, limits=",".join(LIMITS))
     rows = build_exact_model(problem).row_names
     found = {limit for limit, stem in ROWS.items() if any(stem in row for row in rows)}
     assert found == set(ROWS) - ({"FootClearance"} if "dsp" in name else set())

@@ -13,7 +13,7 @@ from nlp_gait.formulation import GaitProblem, Objective
 FOUND = 1e-6  # a run with at most this gap has reached the best known value
 ROUNDING = 1e-12  # a share below this is shown as zero
 SIX_DECIMALS = ".6f"
-SMALL, LARGE = 5e-7, 1e12  # six decimals show zero for less, and digits without a meaning for more
+LEAST_SHOWN, MOST_SHOWN = 5e-7, 1e12  # six decimals show zero for less, and digits without a meaning for more
 
 
 # Names of solvers as the field writes them.
@@ -43,7 +43,7 @@ def with_unit(value: float | None, unit: str, digits: str = SIX_DECIMALS) -> str
     """Format a value with its unit, for example ``0.845868 W``; a dash for None."""
     if value is None:
         return "-"
-    if digits == SIX_DECIMALS and value and math.isfinite(value) and not SMALL <= abs(value) < LARGE:
+    if digits == SIX_DECIMALS and value and math.isfinite(value) and not LEAST_SHOWN <= abs(value) < MOST_SHOWN:
         digits = ".3g"
     return format_number(value, digits) + ("" if unit == "1" else f" {unit}")
 

@@ -262,5 +262,5 @@ def cluster_ends(problem: GaitProblem, ends: Sequence[StartEnd]) -> list[LocalOp
 
 
 def bound_missed(starts: int) -> float:
-    """Return the largest share of starts, with 95 % confidence, that an optimum attracts which none of so many starts reached."""
+    """Return the largest share of starts, with 95 % confidence, that an optimum attracts if no start has reached it."""
     return -math.expm1(math.log(1 - CONFIDENCE) / starts)

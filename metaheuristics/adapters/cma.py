@@ -72,7 +72,7 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
             "bounds": [0.0, 1.0],
             "popsize": int(self._size),
             "randn": lambda *shape: self._start.rng.standard_normal(shape),
-            "seed": np.nan,  # else it seeds NumPy's global generator
+            "seed": np.nan,  # otherwise it seeds NumPy's global generator
             # criteria on objective values, which pycma does not see, are switched off; those on the distribution remain
             **dict.fromkeys(("tolfun", "tolfunhist", "tolfunrel"), -1.0),
             **dict.fromkeys(("tolflatfitness", "tolstagnation"), np.inf),

@@ -47,7 +47,7 @@ class ParticleSwarm:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ConstantInertiaSwarm(ParticleSwarm):
-    """Global-best particle swarm with the constant inertia weight of 1 that Gupta, Pratihar, Deb (2023) print; else as `pso`."""
+    """Global-best particle swarm `pso`, with the constant inertia weight of 1 that Gupta, Pratihar, Deb (2023) print."""
 
     inertia_damping: float = 1.0
     name: ClassVar[str] = "pso-constant"

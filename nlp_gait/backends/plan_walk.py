@@ -393,7 +393,7 @@ def describe_own_bounds(problem: GaitProblem, x: Mapping[str, float]) -> list[st
 
 
 def find_place(name: str, steps: int) -> tuple[str, str]:
-    """Return where in a walk of so many steps a row of that name is, and the rest of its name."""
+    """Return where in a walk of ``steps`` steps a row of that name is, and the rest of its name."""
     if step := re.match(r"step(\d+)_(ssp_|dsp_)?", name):  # of a walk whose steps differ
         support = {"ssp_": ", single support", "dsp_": ", double support"}.get(step[2], "")
         return f"step {step[1]}{support}", name.removeprefix(step[0])

@@ -55,7 +55,7 @@ def solve(
             main thread), 1 for this process alone. The solution does not depend on it, except for its times.
 
     Returns:
-        The best start that converged and is feasible for the exact functions; else the best feasible end point, or the least
+        The best start that converged and is feasible for the exact functions; otherwise the best feasible end point, or the least
         infeasible one with its violated rows.
 
     Raises InputError for a value that is not allowed or a solver that does not run here, and Interrupted for Ctrl-C, with the

@@ -288,7 +288,7 @@ def _read_opti(opti: ca.Opti) -> _Parts:
 
 
 def _to_column(what: str, values: Any, size: int) -> list[float]:
-    """Return one number for each of so many entries; a single one counts for all."""
+    """Return ``size`` numbers; a single one counts for all."""
     numbers = to_floats(what, values).ravel()
     if numbers.size not in (1, size) or (numbers.size == 0 and size):
         raise InputError(f"{what} must be one number{f' or {size}' if size > 1 else ''}, got {numbers.size}")

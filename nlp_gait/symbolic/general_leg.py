@@ -15,7 +15,7 @@ from casadi import DM, SX
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic.elimination import Factors, choose_pivots, factorise
 from nlp_gait.symbolic.kinematics import (
-    TINY,
+    LEAST_NORM,
     UP,
     axis_rotation,
     build_rotation,
@@ -30,9 +30,9 @@ from nlp_gait.symbolic.trajectories import Array, Motion, map_motion, stack
 # for the iterates of a solver, which may be poses that no gait has.
 LEAST_PIVOT, LEAST_PIVOT_OF_ITERATES = 1e-6, 1e-3
 # Misfit of a leg as a share of its length beyond which its rates are zero: the pose is out of reach.
-CLOSED = 1e-6
-# Largest misfit before Newton's last step, in lengths of a leg and rad; else the guess is used.
-NEAR = 0.01
+CLOSURE_TOL = 1e-6
+# Largest misfit before Newton's last step, in lengths of a leg and rad; otherwise the guess is used.
+LARGEST_MISFIT = 0.01
 # Random poses on which Newton's method is tried, and those on which the order of elimination is chosen.
 POSES, ORDER_POSES, SEED = 2000, 400, 0
 # Distance of hip and ankle as a share of the leg's length, its direction to the front and to the side, and the lean of the torso.
@@ -89,8 +89,8 @@ class _Chain(NamedTuple):
 def leg_motion(leg: Leg, steps: int, torso: TorsoMotion, margin: SX, ops: Nonsmooth, *, held: bool) -> LegMotion:
     """Return the angles, velocities and accelerations of a leg, defined for every finite input.
 
-    Newton's method takes so many steps after the guess; ``margin`` is on the reach of the knee (see ``Nonsmooth.acos``). If
-    ``held``, the rates of a leg that misses its foot are zero; else they are those of its angles.
+    Newton's method takes ``steps`` iterations from the guess; ``margin`` is on the reach of the knee (see ``Nonsmooth.acos``). If
+    ``held``, the rates of a leg that misses its foot are zero; otherwise they are those of its angles.
     """
     arm = torso.rotation @ DM(leg.hip_m - torso.point_m)
     swept = ca.cross(torso.spin, arm)
@@ -109,7 +109,7 @@ def leg_motion(leg: Leg, steps: int, torso: TorsoMotion, margin: SX, ops: Nonsmo
     linear, angular = _compute_bias(chain, qd)
     qdd = factors.solve(ca.vertcat((hip.acceleration - linear) / leg.length_m, torso.spin_rate - angular))
     if held:
-        closed = miss <= CLOSED * leg.length_m
+        closed = miss <= CLOSURE_TOL * leg.length_m
         qd, qdd = (ca.vertcat(*(ca.if_else(closed, value, 0) for value in ca.vertsplit(rate))) for rate in (qd, qdd))
     return LegMotion(Motion(q, qd, qdd), _knee_cosine(leg, ca.sumsqr(hip.position - _ankle(leg))), miss)
 
@@ -144,7 +144,7 @@ def make_leg_root(leg: Leg, steps: int, ops: Nonsmooth, margin: SX) -> Root:
             cosines, sines = cosines * turn_cos - sines * turn_sin, sines * turn_cos + cosines * turn_sin
         if not steps:
             return ca.atan2(sines, cosines)
-        near = ca.sumsqr(off) <= NEAR**2  # else out of reach, where the guess is reasonable
+        near = ca.sumsqr(off) <= LARGEST_MISFIT**2  # otherwise out of reach, where the guess is reasonable
         cosines, sines = (ca.if_else(near, new, old) for new, old in zip((cosines, sines), first, strict=True))
         return ca.atan2(sines, cosines)
 
@@ -198,7 +198,7 @@ def _solve_ankle(
     alpha, beta = (x - c * y) / sine_squared, (y - c * x) / sine_squared
     left = (ca.sumsqr(direction) - alpha**2 - beta**2 - 2 * c * alpha * beta) / sine_squared
     sign = 1.0 if float(at_zero @ normal) >= 0 else -1.0
-    between = alpha * DM(fifth) + beta * DM(sixth) + sign * ca.sqrt(ca.fmax(left, TINY)) * DM(normal)
+    between = alpha * DM(fifth) + beta * DM(sixth) + sign * ca.sqrt(ca.fmax(left, LEAST_NORM)) * DM(normal)
     return find_rotation(fifth, between, m), find_rotation(sixth, direction, between)
 
 
@@ -210,7 +210,7 @@ def _solve_hip(axes: Array, third: SX, first: SX) -> tuple[tuple[SX, SX], tuple[
     gain = float(np.hypot(along, across))
     # cos(q2 - delta) = kappa, with q2 = 0 on the same side of delta
     kappa = ca.fmax(-1, ca.fmin(1, (ca.dot(DM(a), third) - constant) / gain))
-    sine = -np.sign(across) * ca.sqrt(ca.fmax(1 - kappa**2, TINY))
+    sine = -np.sign(across) * ca.sqrt(ca.fmax(1 - kappa**2, LEAST_NORM))
     cos_d, sin_d = along / gain, across / gain
     two = cos_d * kappa - sin_d * sine, sin_d * kappa + cos_d * sine
     one = find_rotation(a, rotate_vector(SX(DM(b)), *two, SX(DM(c))), third)

@@ -12,7 +12,7 @@ from nlp_gait.robots.tree import TreeBody
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Array, Motion, stack
 
-TINY = 1e-20  # keeps norms away from zero, where a pose is out of reach
+LEAST_NORM = 1e-20  # keeps norms away from zero, where a pose is out of reach
 
 FORWARD, TO_THE_LEFT, UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)  # axes of the world
 
@@ -41,7 +41,7 @@ def find_rotation(axis: Array, before: SX, after: SX) -> tuple[SX, SX]:
     k = DM(axis)
     cos = ca.dot(before, after) - ca.dot(k, before) * ca.dot(k, after)
     sin = ca.dot(k, ca.cross(before, after))
-    scale = 1 / ca.sqrt(ca.fmax(cos**2 + sin**2, TINY**2))
+    scale = 1 / ca.sqrt(ca.fmax(cos**2 + sin**2, LEAST_NORM**2))
     return cos * scale, sin * scale
 
 

@@ -37,7 +37,7 @@ class Root:
     residual: Callable[[SX, SX], SX]  #: (n,) of unknown (n,) and inputs, dimensionless, zero at the solution
     #: (n,) of the inputs: a guess and a fixed number of Newton steps, defined for all inputs
     newton: Callable[[SX], SX]
-    lift: bool  #: whether ``Lifted`` makes the unknown a variable; else it differentiates through ``newton``
+    lift: bool  #: whether ``Lifted`` makes the unknown a variable; otherwise it differentiates through ``newton``
 
 
 class OpenRoots(NamedTuple):

@@ -190,7 +190,8 @@ class SampleDerivatives(NamedTuple):
 def derive_sample(function: ca.Function, active: Integers, used: Integers, directions: int) -> SampleDerivatives:
     """Return the derivatives of a function of vectors in the cheapest form.
 
-    ``active`` inputs vary, ``used`` outputs are read; a sample has at most so many ``directions``, or one for each active input.
+    ``active`` inputs vary, ``used`` outputs are read; a sample is differentiated in at most ``directions`` directions, or one for
+    each active input.
     """
     u = function.sx_in(0)
     v = function.call([u])[0][used.tolist()]

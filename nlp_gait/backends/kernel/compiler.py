@@ -70,7 +70,7 @@ def read_native_source(package: str, name: str) -> str:
 
 
 def find_compiler() -> Compiler:
-    """Return the first C++ compiler that works: ``$CXX``, ``$CC``, c++, g++, clang++, ``ziglang``; else raises CompilerError."""
+    """Return the first C++ compiler that works: ``$CXX``, ``$CC``, c++, g++, clang++, ``ziglang``; raises CompilerError."""
     return _find(os.environ.get("CXX", ""), os.environ.get("CC", ""), os.environ.get("PATH", ""))
 
 

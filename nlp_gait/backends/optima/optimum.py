@@ -25,7 +25,7 @@ from nlp_gait.formulation.solution import Guess, Outcome
 # Singular values of the active rows, each of length 1, below this share of the largest are zero.
 RANK = 1e-9
 # A curvature below this share of the largest, or of 1 in units of cost per squared range, is zero.
-FLAT = 1e-12
+FLAT_CURVATURE = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,13 +113,13 @@ def solve_kkt(hessian: Array, rows: Array, r: Array, c: Array, variables: int) -
     reduced = null.T @ hessian @ null
     curvature, directions = np.linalg.eigh((reduced + reduced.T) / 2)
     steepest = np.abs(curvature).max(initial=0.0)
-    zero = np.abs(curvature) <= FLAT * max(steepest, 1.0)
+    zero = np.abs(curvature) <= FLAT_CURVATURE * max(steepest, 1.0)
     flat = null @ directions[:, zero]
     curved = null @ directions[:, ~zero]
     reason = None
-    if np.abs(flat[:variables]).max(initial=0.0) > np.sqrt(FLAT):
+    if np.abs(flat[:variables]).max(initial=0.0) > np.sqrt(FLAT_CURVATURE):
         reason = "neither bounds nor curvature determine x*: it is not an isolated minimum"
-    elif (curvature < -FLAT * max(steepest, 1.0)).any():
+    elif (curvature < -FLAT_CURVATURE * max(steepest, 1.0)).any():
         reason = f"the curvature along the active bounds is negative ({curvature[0]:.1e}): x* is no minimum"
     dw = dw + curved @ ((curved.T @ (r - hessian @ dw)).T / curvature[~zero]).T
     pull = space.T @ (r - hessian @ dw)
@@ -127,7 +127,7 @@ def solve_kkt(hessian: Array, rows: Array, r: Array, c: Array, variables: int) -
         w=dw,
         multipliers=((u @ (pull.T / s).T).T / length).T,
         inconsistent=np.abs(scaled - u @ inside).max(axis=0, initial=0.0),
-        flat=np.abs(flat).max(axis=1, initial=0.0) > np.sqrt(FLAT),
+        flat=np.abs(flat).max(axis=1, initial=0.0) > np.sqrt(FLAT_CURVATURE),
         freedom=null.shape[1],
         dependent=len(rows) - rank,
         reason=reason,
@@ -140,7 +140,7 @@ ROUNDS = 30
 # Largest violation of the conditions, in units of cost per range of a variable, and of the rows.
 RESIDUAL = 1e-9
 # A multiplier or a slack below this is zero: the bound is weakly active, and x* may move differently to either side.
-WEAK = 1e-8
+WEAK_MULTIPLIER = 1e-8
 # Most unknowns: dense linear algebra takes minutes for more.
 LARGEST = 2_500
 
@@ -236,7 +236,7 @@ def _converge(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Op
             break
         w, lam[active] = w + step.w, lam[active] + step.multipliers
         _, values, lower, upper = (to_array(output) for output in functions.values(w, p))
-        wrong = (lam * side < -WEAK) & ~equation
+        wrong = (lam * side < -WEAK_MULTIPLIER) & ~equation
         violated = np.where(values > upper + RESIDUAL, 1, np.where(values < lower - RESIDUAL, -1, 0)) * (side == 0)
         if wrong.any() or violated.any():
             side = np.where(wrong, 0, side + violated)
@@ -248,7 +248,7 @@ def _converge(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Op
             reason = step.reason
             break
     slack = np.minimum(upper - values, values - lower)
-    weak = np.where(side == 0, np.abs(slack) < WEAK, np.abs(lam) < WEAK) & ~equation
+    weak = np.where(side == 0, np.abs(slack) < WEAK_MULTIPLIER, np.abs(lam) < WEAK_MULTIPLIER) & ~equation
     ties = (f"lifted[{i}]" for i in range(len(functions.model.tie_upper)))
     names = (*functions.model.row_names, *ties, *(f"bounds[{name}]" for name in problem.names))
     return Optimum(

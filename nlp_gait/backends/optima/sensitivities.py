@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nlp_gait.backends.optima.optimum import WEAK, Optimum, build_kkt_functions, solve_kkt, to_array
+from nlp_gait.backends.optima.optimum import WEAK_MULTIPLIER, Optimum, build_kkt_functions, solve_kkt, to_array
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
@@ -19,7 +19,7 @@ from nlp_gait.formulation.locking import lock_casadi
 # Dependent active rows may contradict each other by this share of a row's change.
 CONTRADICTION = 1e-6
 # A bound that is approached more slowly than this per unit of a quantity is not approached.
-STILL = 1e-12
+LEAST_APPROACH = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,7 +108,7 @@ def _find_reach(optimum: Optimum, change: _Change, moved: Array, multipliers: Ar
     """
     values, lower, upper = optimum.rows
     inactive, active = optimum.side == 0, optimum.active
-    priced = np.abs(optimum.multipliers[active]) > WEAK
+    priced = np.abs(optimum.multipliers[active]) > WEAK_MULTIPLIER
     side = optimum.side[active]
     rate = change.values + moved
     prices = (optimum.multipliers[active] * side)[priced]
@@ -117,7 +117,7 @@ def _find_reach(optimum: Optimum, change: _Change, moved: Array, multipliers: Ar
     shrinks = [(rate - change.upper)[inactive], (change.lower - rate)[inactive], falls]
     distance, speed = np.maximum(np.concatenate(room), 0.0)[:, None], np.concatenate(shrinks)
     with np.errstate(divide="ignore", invalid="ignore"):
-        change_at_bound = np.where(np.abs(speed) > STILL, distance / speed, np.inf)
+        change_at_bound = np.where(np.abs(speed) > LEAST_APPROACH, distance / speed, np.inf)
     up = np.where(change_at_bound > 0.0, change_at_bound, np.inf).min(axis=0, initial=np.inf)
     down = np.where(change_at_bound < 0.0, change_at_bound, -np.inf).max(axis=0, initial=-np.inf)
     return np.array([down, up])

@@ -34,11 +34,11 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Evaluations, Gu
 from nlp_gait.interrupts import Stop, defer_interrupts, never
 
 CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
-# Sigmoid widths of further stages, for a point that the exact functions find infeasible, or where smoothing is dear.
+# Sigmoid widths of further stages, for a point that the exact functions find infeasible, or where smoothing is expensive.
 NARROWER_WIDTHS = (1e-4, 5e-5, 2e-5)
-# Smoothing is dear if it may cost this share of the objective. Samples keep some widths away from the jump: with 0.065 m of mean
-# margin in x, NAO's single support needs 0.55 % too much at 0.5 mm.
-DEAR = 1e-4
+# Smoothing is expensive if it may cost this share of the objective. Samples keep some widths away from the jump: with 0.065 m
+# of mean margin in x, NAO's single support needs 0.55 % too much at 0.5 mm.
+EXPENSIVE = 1e-4
 
 # Options of every IPOPT here: it prints nothing, and ignores an ``ipopt.opt`` in the working folder.
 QUIET: Mapping[str, Any] = {
@@ -99,7 +99,7 @@ class IpoptSettings(Solver):
     #: compiled, because selecting the rows takes a run
     few_rows: bool | None = None
     #: of the sigmoids that replace a jump, one stage for each, in units of the switch [m for a margin]; empty for those of the
-    #: NLP. Narrower ones follow if the exact functions refuse the last stage's point, or if smoothing is dear there
+    #: NLP. Narrower ones follow if the exact functions refuse the last stage's point, or if smoothing is expensive there
     widths: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -161,7 +161,7 @@ class Ipopt(Solver):
             **QUIET,
             "ipopt.mu_strategy": settings.barrier,
             "ipopt.tol": settings.tolerance,
-            "ipopt.bound_relax_factor": 0.0,  # else optima violate the exact limits
+            "ipopt.bound_relax_factor": 0.0,  # otherwise optima violate the exact limits
             "ipopt.max_iter": settings.iterations,
             "ipopt.max_wall_time": settings.time_limit_s,
             "ipopt.hessian_approximation": settings.hessian,
@@ -281,7 +281,9 @@ class Ipopt(Solver):
         """Return the outcome of narrower sigmoids: the first feasible one, and from there on the cheapest."""
         for width in NARROWER_WIDTHS if self.model.smoothed else ():
             feasible = outcome.violation <= FEASIBILITY_TOLERANCE
-            if not outcome.claimed or (feasible and self._estimate_smoothing(run, guess) < DEAR * abs(outcome.cost)):
+            if not outcome.claimed or (
+                feasible and self._estimate_smoothing(run, guess) < EXPENSIVE * abs(outcome.cost)
+            ):
                 break
             if width >= guess.width:
                 continue

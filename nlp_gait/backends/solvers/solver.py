@@ -29,7 +29,7 @@ REASONS = {
     KILLED: "was ended within an iteration, after the time limit; iterations and calls of its stage are not counted",
 }
 # Variables from which one iteration may outlast the time limit: of the 15,754 of stairs-track's, one took 591 s.
-LARGE = 5000
+MANY_VARIABLES = 5000
 # Iterates in a row of an attempt that may violate a row by more than its scale. Most starts of phases and cycles have at
 # most 16, a few of the planned stairs 28; those with more crept for 100 to 350 iterations.
 LONGEST_INFEASIBLE = 20
@@ -207,7 +207,7 @@ class WatchedSolver:
         result: Mapping[str, Any]
         limits = self._watch.limits
         limits.sides, limits.patience, limits.infeasible = (arguments["lbg"], arguments["ubg"]), self._patience, 0
-        if len(arguments["lbx"]) >= LARGE and has_fork():
+        if len(arguments["lbx"]) >= MANY_VARIABLES and has_fork():
             result = self._call_in_fork(arguments)
         else:
             result, self._stats = self._solver(**arguments), self._solver.stats()

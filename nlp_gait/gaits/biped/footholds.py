@@ -177,7 +177,7 @@ class Flight:
         return shape(FORWARD, SX(1)), add_motions(rise, shape(BOW, lift))
 
     def find_least_lift(self, treads: int) -> float:
-        """Return the least bow of a swing by so many treads, of two if it passes the standing foot, over all edges [m].
+        """Return the least bow of a swing by 1 or 2 ``treads``, of two if it passes the standing foot, over all edges [m].
 
         The sole is high enough before its toe has come halfway to an edge.
         """
@@ -189,7 +189,7 @@ class Flight:
         return float(np.ceil(1e3 * (np.max((below - above) / BOW(s)) + self.clearance_m)) / 1e3)
 
     def list_treads(self, count: int) -> tuple[Tread, ...]:
-        """Return so many treads, for a robot whose feet begin at x = 0."""
+        """Return the first ``count`` treads, for a robot whose feet begin at x = 0."""
         return tuple(
             Tread(edge_m=k * self.run_m - self._setback, height_m=k * self.rise_m) for k in range(1, count + 1)
         )

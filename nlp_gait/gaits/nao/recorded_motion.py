@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
 LEAST_ROWS = 5
 SAME_TIME_S = 1e-9
-LIFTED = 2e-3  # [m]; a foot that rises by less stands
-STILL = 1e-5  # [m]; a foot nearer than this to its last place has landed, or than SCATTER times its noise
+LIFTED_M = 2e-3  # [m]; a foot that rises by less stands
+STILL_M = 1e-5  # [m]; a foot nearer than this to its last place has landed, or than SCATTER times its noise
 SCATTER = 4.0 * math.sqrt(2.0)  # standard deviations of the difference of two places, four of them
-FAR = 4.0  # from so many times the distance of a still foot, a swing's end is fitted
+FAR = 4.0  # a swing's end is fitted from the instant at this multiple of the distance of a still foot
 NOISE_RAD = 1e-5  # smaller ones are ignored: angles with five decimals
 LARGEST_ANGLE = 4.0 * math.pi  # [rad]; larger ones are degrees, and those beyond half a turn wrapped
 LARGEST_PERIOD_S = 0.5  # between two rows; larger ones are milliseconds
 LEAST_SHARE = 0.02  # of the time; a shorter phase does not count
-CLOSED = 1e-3  # [rad]; a motion repeats if its end is nearer than this to the mirror image of its beginning
+CLOSED_RAD = 1e-3  # [rad]; a motion repeats if its end is nearer than this to the mirror image of its beginning
 MEDIAN = 0.6745  # of the absolute value of a standard normal variable
 FINE = 400  # instants at which a whole motion is evaluated
 
@@ -106,7 +106,7 @@ class RecordedMotion:
     @property
     def repeats(self) -> bool:
         """Whether the end is the mirror image of the beginning, so that another step can follow."""
-        closed = np.maximum(CLOSED, SCATTER * estimate_noise(self.q))
+        closed = np.maximum(CLOSED_RAD, SCATTER * estimate_noise(self.q))
         return bool((np.abs(self.q[-1] - self.mirror_image().q[0]) < closed).all())
 
     def phases(self, touch_down_s: float | None = None) -> dict[Support, tuple[float, float]]:
@@ -118,10 +118,10 @@ class RecordedMotion:
             return {Support.SINGLE: (0.0, touch_down_s), Support.DOUBLE: (touch_down_s, end)}
         foot = self.right_foot(self.t)
         scatter = SCATTER * float(np.linalg.norm(estimate_noise(foot)))
-        lifted = LIFTED + 2.0 * scatter
+        lifted = LIFTED_M + 2.0 * scatter
         if foot[:, 2].max() < lifted and np.ptp(foot[:, :2], axis=0).max() < lifted:
             return {Support.DOUBLE: (0.0, end)}
-        landing = self._landing(foot, max(STILL, scatter))
+        landing = self._landing(foot, max(STILL_M, scatter))
         if end - landing < LEAST_SHARE * end:
             return {Support.SINGLE: (0.0, end)}
         return {Support.SINGLE: (0.0, landing), Support.DOUBLE: (landing, end)}
@@ -222,12 +222,12 @@ def read_motion(angles: JointAngles, body: Body) -> RecordedMotion:
     q = np.column_stack([columns[name] for name in JOINTS])
     motion = RecordedMotion(body=body, t=angles.t - angles.t[0], q=q, held=tuple(missing))
     heights = motion.right_foot(motion.t)[:, 2]
-    steps = count_swings(heights, LIFTED + SCATTER * float(estimate_noise(heights[:, None])[0]))
+    steps = count_swings(heights, LIFTED_M + SCATTER * float(estimate_noise(heights[:, None])[0]))
     if steps > 1:
         raise InputError(
             f"{angles.owner} shows {steps} steps; one is judged: cut it from the lift-off of a foot to that of the other"
         )
-    return motion.mirror_image() if -heights.min() > max(heights.max(), LIFTED) else motion
+    return motion.mirror_image() if -heights.min() > max(heights.max(), LIFTED_M) else motion
 
 
 def check_times(angles: JointAngles) -> None:

@@ -71,14 +71,14 @@ class Stuck(ca.Callback):
 @pytest.mark.parametrize("presses", [False, True])
 def test_an_iteration_of_a_large_problem_that_does_not_end_is_killed(presses: bool) -> None:
     """At the limit and a grace, or at Ctrl-C; the last iterate remains."""
-    x, stuck = ca.MX.sym("x", solver_module.LARGE), Stuck()
+    x, stuck = ca.MX.sym("x", solver_module.MANY_VARIABLES), Stuck()
     nlp = {"x": x, "f": ca.sumsqr((x - 1) ** 2) + stuck(x[0]), "p": ca.MX.sym("p"), "g": x[0]}
     watch = IterationWatch(nlp)
     options = {"ipopt.hessian_approximation": "limited-memory", "ipopt.print_level": 0, "print_time": False}
     solver = WatchedSolver(ca.nlpsol("solver", "ipopt", nlp, {**options, "iteration_callback": watch}), watch)
     started = time.perf_counter()
     watch.begin(lambda: presses and time.perf_counter() > started + 1.0, started + (60.0 if presses else 4.0))
-    start = np.zeros(solver_module.LARGE)
+    start = np.zeros(solver_module.MANY_VARIABLES)
     result = solver(x0=start, p=0.0, lbx=start - 9.0, ubx=start + 9.0, lbg=[-9.0], ubg=[9.0])
     assert time.perf_counter() - started < 14.0 + solver_module.GRACE_S
     assert watch.reason == ("Interrupted" if presses else "Killed") and not solver.stats()["success"]
