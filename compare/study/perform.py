@@ -60,7 +60,7 @@ class SearchEnd:
 
     x: Array  #: (n,) best point; empty before the first evaluation
     entries: list[Entry] = field(default_factory=list)  #: history, the last one is the end
-    failed: int = 0  #: evaluations
+    failed: int = 0  #: number of failed evaluations
     generations: int = 0
     status: str = ""
     settings: dict[str, Any] = field(default_factory=dict)
@@ -97,7 +97,7 @@ class IsolatedRun:
     deadline: float | None = None  #: of time.monotonic; None before the process begins
 
     def make_job(self) -> Job:
-        """Return the job."""
+        """Return the job that runs the search in a process of its own."""
         call = partial(_search_reported, self.run, self.inputs)
         return Job(call=call, receive=self.receive, is_late=self.is_late, alone=True)
 

@@ -225,8 +225,8 @@ class Continuation:
             outcomes += [] if warm is None else [warm]
             if find_cheapest_feasible(outcomes) is None and not stop():
                 outcomes.append(solver.run(problem, np.clip(near.x, problem.lower, problem.upper), stop))
-        in_vain = bool(earlier) and find_cheapest_feasible(earlier) is None
-        if find_cheapest_feasible(outcomes) is None and not in_vain and (near is None or not earlier):
+        already_failed = bool(earlier) and find_cheapest_feasible(earlier) is None
+        if find_cheapest_feasible(outcomes) is None and not already_failed and (near is None or not earlier):
             rng = np.random.default_rng(self._seed)
             points = [problem.start_point(rng) for _ in range(self._starts)]
             outcomes += run_starts(solver, problem, points, stop)

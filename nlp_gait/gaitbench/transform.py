@@ -46,7 +46,7 @@ def rotate_pairs(order: Sequence[int], angles: Sequence[float]) -> Array:
 def replace_variables(
     problem: GaitProblem, variables: Sequence[Variable], see: Callable[[Any], Any], start: Start | None, **changes: Any
 ) -> GaitProblem:
-    """Return a problem with other variables, which reads the points that ``see`` makes of theirs; other fields may change."""
+    """Return the problem in other variables, whose points ``see`` maps to those of the problem; ``changes`` are more fields."""
     motion = problem.display.motion
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:

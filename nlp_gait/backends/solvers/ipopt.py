@@ -216,7 +216,7 @@ class Ipopt(Solver):
         start = model.start(usual, usual.start_point(np.random.default_rng(0)), width)
         with defer_interrupts() as pressed:
             self.watch.begin(pressed, time.perf_counter() + self.time_limit_s, self.iterations)
-            cold.learn(x0=start, p=np.append(usual.p, width), **bounds)
+            cold.add_violated_rows(x0=start, p=np.append(usual.p, width), **bounds)
         if pressed():
             raise KeyboardInterrupt
         return cold

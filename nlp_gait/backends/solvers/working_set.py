@@ -46,7 +46,7 @@ class WorkingSet:
         self._get_solver = lru_cache(CACHED_SOLVERS)(self._make_solver)
         self._stats: dict[str, Any] = {}
 
-    def learn(self, **arguments: Any) -> None:
+    def add_violated_rows(self, **arguments: Any) -> None:
         """Add the rows that are violated at a start point, or added in a run from it, to those with which runs begin."""
         self._begin = self._begin | self._find_violated(arguments["x0"], arguments)
         _, rows = self._solve_on_few_rows(arguments)

@@ -109,7 +109,7 @@ class Body(ABC):
     drive_limits: bool = False  # whether torques and speeds are within the limits of the robot's file
     length_scale: float = 1.0  # lengths relative to NAO's
     time_scale: float = 1.0  # times and velocities relative to NAO's
-    # By how much the robot's own joints can swing a leg faster than NAO's papers do, in proportion: bounds are as much wider
+    # Ratio of this robot's swing speed to that in NAO's papers, by which bounds on rates and times are scaled
     swing_speed: float = 1.0
     torque_scale: float = 1.0  # torques relative to NAO's
     # Joints of arms that the legs do not carry: each arm is a chain of its own on a torso at rest

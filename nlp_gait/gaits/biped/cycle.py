@@ -79,7 +79,7 @@ def make_cycle_planners(body: Body) -> dict[Support, Planner]:
     mirror = SX([1, -1, 1])
 
     def read(point: InstantPoint) -> tuple[SwitchState, SwitchState, SX]:
-        """States at lift-off and touch-down, and the step length [m]."""
+        """Return the states at lift-off and touch-down, and the step length [m]."""
         lift_off, landed = (read_state(point, switch, body.coordinates) for switch in SWITCHES)
         return lift_off, landed, fmax(point[STEP], LEAST_STEP)
 
@@ -114,7 +114,7 @@ def make_planner(body: Body, read: Callable[[InstantPoint, SX], PhaseMotion]) ->
 def interpolate_states(
     start: SwitchState, end: SwitchState, duration: SX, phase: SX
 ) -> tuple[Motion, tuple[Motion, ...]]:
-    """Motion of the hip (3,) [m] and of every coordinate [rad] from state to state."""
+    """Return the cubic motions of the hip (3,) [m] and of every coordinate [rad] from state to state."""
 
     def curves(*ends: SX) -> tuple[Motion, ...]:
         columns = zip(*map(vertsplit, ends), strict=True)
@@ -158,7 +158,7 @@ class WalkingCycle(Sequence):
         """Parameters of both phases; those of balance begin with the phase's name."""
         both = self.phase_parameters
         balance, shared = ([p for p in both if p.name.endswith(BALANCE) == of_balance] for of_balance in (True, False))
-        jump = ("largest jump of a torque at a switch; the default is out of reach", 0.0, math.inf)
+        jump = ("largest torque jump at a switch; the default never binds", 0.0, math.inf)
         limit = make_parameters((TORQUE_JUMP, "Nm", NO_JUMP_LIMIT * math.ceil(self.body.torque_scale), *jump))
         step = self.variables[-1]
         speed = make_parameters(

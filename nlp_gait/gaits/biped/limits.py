@@ -105,7 +105,7 @@ class Reach(Limit):
 
 
 class Closure(Limit):
-    """Legs that end at their feet where Newton's method computes their angles; gradient solvers have equations instead."""
+    """Contact-closure error of legs whose angles Newton's method computes; gradient solvers enforce closure as equations."""
 
     def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         # A gradient solver needs the same rows in the same places: there they are far below their bound.
@@ -231,7 +231,7 @@ class ArmLimits(Limit):
 
 
 class SplineClearance(Limit):
-    """A planned swing foot above the ground between its ends, and high enough in the middle of its path, an x, at half time."""
+    """Height of a planned swing foot: positive between its ends, and a least height at half time, when x is ``middle`` [m]."""
 
     reads = (Samples.swing_heights,)
 

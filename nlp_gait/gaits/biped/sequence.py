@@ -50,7 +50,7 @@ class SwitchState(NamedTuple):
 def limit_torque_jump(
     switch: str, body: Body, point: Point, before: Samples, after: Samples, *, mirrored: bool = False
 ) -> tuple[Constraint, dict[str, MX]]:
-    """Return the row that limits the jumps of torques at a switch, and a metric, the largest one [Nm].
+    """Return the row that limits torque jumps at a switch, and the largest jump as a metric [Nm].
 
     Positions and rates are continuous. With ``mirrored`` the mirror image of the phase follows, as after the last one of a cycle.
     """
@@ -85,7 +85,7 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
 
 
 def read_state(point: InstantPoint, name: str, coordinates: Iterable[Coordinate]) -> SwitchState:
-    """State of the variables whose names contain ``name``."""
+    """Return the state from the variables whose names contain ``name``."""
     velocity = vertcat(*(point[f"hip_v{axis}_{name}_m_s"] for axis in "xyz"))
     hip = vertcat(*(point[f"hip_{axis}_{name}_m"] for axis in "xyz"))
     rates = vertcat(*(point[f"{c.rate}_{name}_rad_s"] for c in coordinates))
@@ -118,15 +118,15 @@ class End(NamedTuple):
 class MotionSection(NamedTuple):
     """A phase of a longer motion over the left foot, which stands at x = 0."""
 
-    name: str  # before the names of its rows and metrics
+    name: str  # prefix of the names of its rows and metrics
     kind: Support
     begin: End
     end: End
     feet: tuple[Foothold, Foothold]  # of the right foot at begin and end; in step lengths if these are variable
     duration: str  # variable of the motion
     lift: str = LIFT  # variable of the motion: height of a swing
-    step: int = 1  # to which it belongs
-    occurs: int = 1  # how often it occurs; 0 for a pose, of which only the limits count
+    step: int = 1  # number of the step to which it belongs
+    occurs: int = 1  # number of repetitions; 0 for a pose, of which only the limits count
 
 
 class AssembledSections(NamedTuple):

@@ -120,14 +120,14 @@ def make_pose_variables(body: Body) -> list[Variable]:
 
 
 def find_alike(body: Body, state: State) -> dict[str, str]:
-    """Return the cycle's variable for each of a state's."""
+    """Return the name of the cycle's variable for each variable of a state."""
     cycle = make_state_variables(body, state.switch, state.switch)
     return {variable.name: like.name for variable, like in zip(state.make_variables(body), cycle, strict=True)}
 
 
 @cache
 def _load_start() -> dict[str, float]:
-    """Shares of the bounds' ranges at a walk of NAO."""
+    """Return the variables of a walk of NAO as shares of their bounds' ranges."""
     shares: dict[str, float] = json.loads(files(__package__).joinpath("walk_start.json").read_text(encoding="utf-8"))
     return shares
 
@@ -137,8 +137,8 @@ class WalkStart:
     """Start points of a walk, near one of NAO or near a cycle."""
 
     variables: Sequence[Variable]  # between whose bounds it starts
-    alike: Mapping[str, str]  # the cycle's variable for each of the walk's
-    pose: Mapping[str, str]  # the same for those of the poses at both ends
+    alike: Mapping[str, str]  # the cycle's variable for each variable of the walk
+    pose: Mapping[str, str]  # the cycle's variable for each variable of the poses at both ends
     rise: float  # of the ground, for each metre forward
 
     def __call__(self, parameters: Mapping[str, float], rng: np.random.Generator) -> Array:

@@ -51,7 +51,7 @@ def test_rows_that_are_violated_join_until_none_is() -> None:
     assert same(found, whole(**arguments))
     assert few.stats()["success"] and few.stats()["iter_count"] > whole.stats()["iter_count"]  # of several rounds
     first = few.stats()["iter_count"]
-    few.learn(**arguments)
+    few.add_violated_rows(**arguments)
     assert same(few(**arguments), whole(**arguments)) and few.stats()["iter_count"] < first  # all in one round
     assert few.stats()["n_call_nlp_hess_l"] <= first
 
