@@ -15,7 +15,7 @@ from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, Bumps, make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
 from nlp_gait.simulation.sensors import HEIGHT, UPWARD, list_sensors, read_sensors
 
-CHUNK = 200  # steps of the engine without a look at the robot
+CHUNK = 500  # steps of the engine without a look at the robot
 LONGEST_WALK = 3  # simulated times the planned duration, where feedback delays the plan
 SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot that has lost its balance falls within it
 FALLEN_TILT = math.radians(45.0)
