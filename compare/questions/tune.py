@@ -66,6 +66,7 @@ COLUMNS: Mapping[str, Callable[[TunedGait], str]] = {
         f"{row.here.J_per_m:.2f}" if row.here.fell_at_s is None else f"falls at {row.here.fell_at_s:.1f} s"
     ),
     "held-out J/m": lambda row: "-" if math.isnan(row.elsewhere_J_per_m) else f"{row.elsewhere_J_per_m:.2f}",
+    "off its way": lambda row: f"{100 * row.here.off:.1f} %",
     "falls": lambda row: f"{sum(s.fell_at_s is not None for s in (row.here, *row.elsewhere))} of {1 + len(HELD_OUT)}",
     "model J/m": lambda row: f"{row.model_J_per_m:.2f}",
     "model's rows violated": lambda row: f"{row.rows_violated}",
@@ -217,7 +218,10 @@ def _compare_energies(findings: Sequence[TunedGait]) -> Iterator[str]:
     if first.fell_at_s is not None:
         yield f"IPOPT's optimum of the model falls at {first.fell_at_s:.1f} s."
     else:
-        yield f"IPOPT's optimum of the model needs {first.J_per_m:.2f} J/m in the engine, after one simulation."
+        yield (
+            f"IPOPT's optimum of the model needs {first.J_per_m:.2f} J/m in the engine, after one simulation"
+            f"{', but goes beyond what a gait may: ' if first.violation else ''}{', '.join(first.list_excesses())}."
+        )
     for solver in dict.fromkeys(row.solver for row in findings[1:]):
         rows = [row for row in findings if row.solver == solver]
         standing = [row.here.J_per_m for row in rows if row.here.fell_at_s is None]
@@ -227,4 +231,6 @@ def _compare_energies(findings: Sequence[TunedGait]) -> Iterator[str]:
             words += (
                 f"{np.median(standing) / first.J_per_m:.2f} times that energy{' (median)' if len(rows) > 1 else ''}; "
             )
-        yield f"{words}{len(rows) - len(standing)} of {len(rows)} fall."
+        beyond = sum(row.here.violation > 0.0 for row in rows if row.here.fell_at_s is None)
+        beyond_words = f", {beyond} of {len(rows)} go beyond what a gait may" if beyond else ""
+        yield f"{words}{len(rows) - len(standing)} of {len(rows)} fall{beyond_words}."

@@ -14,9 +14,13 @@ from nlp_gait.simulation.measurements import Walk, measure_walk
 from nlp_gait.simulation.plan import Plan, make_plan
 from nlp_gait.simulation.simulate import Conditions, Simulation, SimulationRun, prepare
 
-# What a gait may do: shares of its way, of the time at a torque limit, slip [m], angle beyond a joint's range [rad].
-OFF, SATURATED, SLIP_M, OUTSIDE_RAD = 0.05, 0.02, 0.005, 0.02
-FULL = {"off": 0.2, "saturated": 0.2, "slip_m": 0.05, "outside_rad": 0.2}  # excess that counts as a whole violation
+# What a gait may do, the excess that counts as a whole violation, and how it is said, in a unit of so many per unit.
+ALLOWED = {
+    "off": (0.05, 0.2, 100.0, "{:.1f} % off its way"),
+    "saturated": (0.02, 0.2, 100.0, "{:.1f} % of the time at a torque limit"),
+    "slip_m": (0.005, 0.05, 1000.0, "a foot slips by {:.1f} mm"),
+    "outside_rad": (0.02, 0.2, math.degrees(1.0), "{:.1f} degrees beyond the range of a joint"),
+}
 MORE_STEPS = 4  # of the walk for whose ground the world is made
 
 
@@ -32,6 +36,13 @@ class GaitScore:
     saturated: float  #: largest share of the time that a joint is at its torque limit
     slip_m: float
     outside_rad: float  #: largest angle beyond a joint's mechanical range
+
+    def list_excesses(self) -> list[str]:
+        """Return what it does beyond what it may, in words."""
+        done = {name: getattr(self, name) for name in ALLOWED}
+        return [
+            words.format(done[name] * scale) for name, (most, _, scale, words) in ALLOWED.items() if done[name] > most
+        ]
 
 
 NO_MOTION = GaitScore(
@@ -84,9 +95,8 @@ class Arena:
             "slip_m": m.slip_m,
             "outside_rad": max(0.0, float(outside.max())),
         }
-        allowed = {"off": OFF, "saturated": SATURATED, "slip_m": SLIP_M, "outside_rad": OUTSIDE_RAD}
-        excess = sum(min(1.0, max(0.0, found[name] - most) / FULL[name]) for name, most in allowed.items())
-        violation = excess / len(FULL)
+        excess = sum(min(1.0, max(0.0, found[name] - most) / full) for name, (most, full, *_) in ALLOWED.items())
+        violation = excess / len(ALLOWED)
         if m.fell_at_s is not None:
             violation = 2.0 - m.fell_at_s / (plan.duration_s + self._settle_s)
         energy = walk.engine_J_per_m or m.measured.total_W * float(simulation.plan_t[-1]) / planned

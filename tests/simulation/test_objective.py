@@ -1,7 +1,7 @@
 """The engine as objective: scores are the numbers of a simulation, and searches run on it."""
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +46,13 @@ def test_a_fall_is_worse_than_anything_else_and_worst_if_early(cycle: Result) ->
     early, late = (Arena(cycle.problem, steps=STEPS, conditions=Conditions(push=p)).score(cycle.x) for p in pushes)
     assert early.fell_at_s is not None and late.fell_at_s is not None and early.fell_at_s < late.fell_at_s
     assert 2.0 > early.violation > late.violation > 1.0
+
+
+def test_what_a_gait_does_beyond_what_it_may_is_said(cycle: Result, arena: Arena) -> None:
+    score = arena.score(cycle.x)
+    assert not score.list_excesses()
+    wide = replace(score, off=0.116, slip_m=0.02)
+    assert wide.list_excesses() == ["11.6 % off its way", "a foot slips by 20.0 mm"]
 
 
 def test_searches_run_on_it_with_any_number_of_threads(cycle: Result, arena: Arena) -> None:
