@@ -21,7 +21,7 @@ from tests.compare.cli.calls import as_json, one_sentence
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("daqp")
 
-from nlp_gait.simulation.balance.controller import Balance, WholeBodyBalance  # noqa: E402
+from nlp_gait.simulation.balance.controller import Balance, StepClock, WholeBodyBalance  # noqa: E402
 from nlp_gait.simulation.balance.drives import load_drive  # noqa: E402
 from nlp_gait.simulation.balance.reference import WalkReference, compute_left_load  # noqa: E402
 from nlp_gait.simulation.balance.whole_body import Targets, Torques, WholeBodyQP  # noqa: E402
@@ -115,6 +115,17 @@ def solve_instant(plan: Plan, share: float, mass: tuple[float, float, float], le
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(data.qacc[addresses.rates], solution.accelerations, rtol=1e-6, atol=1e-5)
     return solution, data
+
+
+def test_a_foothold_that_will_bear_no_load_is_not_moved(plan: Plan) -> None:
+    reference = WalkReference(plan, prepare(plan, Conditions(), Drive())[0], find_torque_limits(plan))
+    clock = StepClock(Balance(), reference)
+    while clock.phase.swing is None:
+        clock.advance(np.array([0.5, 0.5]), reference.sample("feet", clock.time_s).reshape(2, 3))
+    pushed = reference.sample("dcm", clock.time_s) + 0.03
+    assert clock.choose(pushed)[0].shift.any()
+    reference._rows[:, reference._columns["carry"]] = 0.0
+    assert not clock.choose(pushed)[0].shift.any()
 
 
 def test_torques_and_wrenches_give_the_accelerations_in_the_engine(plan: Plan) -> None:

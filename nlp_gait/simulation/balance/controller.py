@@ -81,6 +81,7 @@ TOGETHER = 0.03  # feet of a planar robot nearer than this [h] share the load as
 LANDED_LOAD, EARLY_LOAD, MOST_LOAD = 0.1, 0.1, 3.0  # [weight]
 SEARCH_SPEED, DEEPEST = 0.1, 0.15  # of a foot that is late [h w], [h]
 GOAL_SPEED = 0.8  # of a foothold [h w]
+LEAST_CARRY = 1e-3  # effect of a foothold on the divergent component, below which it is not changed
 CLOCK_FILTER, SLOWEST_CLOCK, FASTEST_CLOCK = 0.2, 0.3, 4.0
 
 
@@ -198,9 +199,12 @@ class StepClock:
             high[1] = max(-closest, low[1])
         if plan.ground:  # feet on stairs have no room for other footholds
             low[0] = high[0] = -self.offsets[stance, 0]
+        carry = float(reference.sample("carry", end + 1e-6)[0])
+        if carry < LEAST_CARRY:  # the landing foot bears no load, and none of its places helps
+            carry, low, high = LEAST_CARRY, np.zeros(2), np.zeros(2)
         return StepLimits(
             rate=reference.rate,
-            carry=float(reference.sample("carry", end + 1e-6)[0]),
+            carry=carry,
             zmp_low=s.reserve * np.minimum(np.array([-back, -right]) - zmp, 0.0),
             zmp_high=s.reserve * np.maximum(np.array([front, left]) - zmp, 0.0),
             shift_low=low,
