@@ -363,7 +363,7 @@ def _run_starts(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkS
     for k in range(check_count("starts", settings.starts)):
         x0: Array = np.clip(problem.start_point(rng), problem.lower, problem.upper)
         if cycle is not None:
-            gait = solve(cycle, seed=k, solver=IpoptSettings(few_rows=False).prepare(cycle, MANY_SOLVES), workers=1)
+            gait = solve(cycle, seed=k, workers=1)
             settings.progress(f"start {k + 1}, cycle: {gait.status}")
             x0 = start_from_cycle(problem, x0, gait.x, float(problem.options.get("stair_rise_m", 0.0)))
             if (

@@ -2,10 +2,11 @@
 
 Everything has a place in one array: variables, parameters, inputs and outputs of all samples, derivatives, constants. A step
 copies initial values, executes a tape of scalar operations (the glue), adds products of runs of numbers (sparse linear algebra),
-or executes the tape of a function of one sample for all pairs of a sample and a direction, many of them at once.
+or calls a function of one sample for all pairs of a sample and a direction, as many at once as there are lanes.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -35,6 +36,8 @@ _TEXTS |= {name: f"{{f}}{name.lower()}({{0}})" for name in _UNARY.split()}
 _TEXTS |= {name: f"{{f}}{_NAMES.get(name, name.lower())}({{0}}, {{1}})" for name in _BINARY.split()}
 EXPRESSIONS: dict[int, str] = {getattr(ca, f"OP_{name}"): text for name, text in _TEXTS.items()}
 CODES = {operation: code for code, operation in enumerate(EXPRESSIONS)}
+# Operations in one C++ function: longer ones take the compiler longer per operation, shorter ones pass more values in memory.
+PIECE = 500
 
 
 def read_operations(function: ca.Function) -> Iterator[Instruction]:
@@ -43,6 +46,61 @@ def read_operations(function: ca.Function) -> Iterator[Instruction]:
         if instruction.operation not in (*EXPRESSIONS, ca.OP_INPUT, ca.OP_CONST, ca.OP_OUTPUT):
             raise CompilerError(f"operation {instruction.operation} of function {function.name()}")
         yield instruction
+
+
+def write_function(name: str, function: ca.Function) -> str:
+    """Return C++ of ``void name(const Vector* in, Vector* out)``, with all inputs one after the other, and all outputs.
+
+    It is split into pieces, so that the compile time is proportional to the length.
+    """
+    tape = list(read_operations(function))
+    free = {
+        k: f"in[{node.place}]" if node.operation == ca.OP_INPUT else f"v_number({format_number(node.constant)})"
+        for k, node in enumerate(tape)
+        if node.operation in (ca.OP_INPUT, ca.OP_CONST)
+    }
+    body = [k for k in range(len(tape)) if k not in free]
+    piece = {k: i // PIECE for i, k in enumerate(body)}
+    kept: dict[int, int] = {}  # values that later pieces need, by their place in memory
+    for k in body:
+        for value in tape[k].arguments:
+            if value not in free and piece[value] != piece[k]:
+                kept.setdefault(value, len(kept))
+    pieces = -(-len(body) // PIECE)
+    lines: list[str] = []
+    for number in range(pieces):
+        lines.append(
+            f"static NEVER_INLINE void {name}_{number}(const Vector* __restrict in, Vector* __restrict out, "
+            "Vector* __restrict kept) {"
+        )
+        declared: set[int] = set()
+        for k in body[number * PIECE : (number + 1) * PIECE]:
+            node = tape[k]
+            for value in node.arguments:
+                if value not in declared:
+                    declared.add(value)
+                    lines.append(f"const Vector t{value} = {free.get(value) or f'kept[{kept[value]}]'};")
+            names = [f"t{value}" for value in node.arguments]
+            if node.operation == ca.OP_OUTPUT:
+                lines.append(f"out[{node.place}] = {names[0]};")
+                continue
+            declared.add(k)
+            lines.append(f"const Vector t{k} = {EXPRESSIONS[node.operation].format(*names, f='v_')};")
+            if k in kept:
+                lines.append(f"kept[{kept[k]}] = t{k};")
+        lines.append("}")
+    calls = " ".join(f"{name}_{number}(in, out, kept);" for number in range(pieces))
+    lines.append(f"static void {name}(const Vector* in, Vector* out) {{ Vector kept[{len(kept) + 1}]; {calls} }}")
+    return "\n".join(lines)
+
+
+def format_number(value: float) -> str:
+    """Return a double as C++, to the last bit."""
+    if math.isnan(value):
+        return "NAN"
+    if math.isinf(value):
+        return "INFINITY" if value > 0 else "-INFINITY"
+    return repr(float(value))
 
 
 Integers = np.ndarray[Any, np.dtype[np.int64]]
@@ -68,17 +126,6 @@ class PlaceBlock(NamedTuple):
     direction: int
 
 
-class SampleTape(NamedTuple):
-    """Function of one sample: operations on slots, which hold its inputs, its outputs, constants, and what is between."""
-
-    begin: int  #: of its operations in the plan's tape; likewise ``end``
-    end: int
-    inputs: int  #: number of slots; likewise ``outputs``, and ``slots`` of all
-    outputs: int
-    slots: int
-    constants: tuple[float, ...]  #: in the slots after the outputs
-
-
 class Call(NamedTuple):
     """Call of a function of one sample for all samples and directions."""
 
@@ -96,7 +143,7 @@ class DerivativePlan:
     size: int = 1  #: of the memory, in doubles
     #: Initial values by place; all others are zero
     initial: dict[int, float] = field(default_factory=lambda: {ONE: 1.0})
-    functions: list[SampleTape] = field(default_factory=list)
+    functions: list[ca.Function] = field(default_factory=list)  #: functions of one sample, to be emitted
     calls: list[Call] = field(default_factory=list)
     tape: list[tuple[int, int, int, int]] = field(default_factory=list)  #: (operation, target, argument, argument)
     #: (target, source, factor, length): adds factor times a run of numbers to another run
@@ -132,18 +179,8 @@ class DerivativePlan:
         self.calls.append(call)
 
     def add_function(self, function: ca.Function) -> int:
-        """Add a function of one sample, and return its number."""
-        begin, inputs, outputs = len(self.tape), function.nnz_in(), function.nnz_out()
-        first, constants = inputs + outputs, dict[float, int]()
-        registers = self._add_tape(
-            function,
-            range(inputs),
-            range(inputs, first),
-            lambda value: constants.setdefault(value, first + len(constants)),
-            lambda _: first + len(constants),
-        )
-        slots = first + len(constants) + registers
-        self.functions.append(SampleTape(begin, len(self.tape), inputs, outputs, slots, tuple(constants)))
+        """Add a function to be emitted, and return its number."""
+        self.functions.append(function)
         return len(self.functions) - 1
 
     def add_expressions(
@@ -152,45 +189,32 @@ class DerivativePlan:
         """Add scalar expressions (k,) to the tape, with places of their inputs' values (-1 if unused) and of their own."""
         if not outputs.shape[0]:
             return
-        begin = len(self.tape)
         function = ca.Function("glue", list(inputs), [ca.cse(outputs)])
-        sources = np.concatenate(places).tolist()
-        self._add_tape(function, sources, targets.tolist(), self.place_constant, self.allocate)
-        self._add_step(phase, TAPE, begin, len(self.tape))
-
-    def _add_tape(
-        self,
-        function: ca.Function,
-        sources: Sequence[int],
-        targets: Sequence[int],
-        place_constant: Callable[[float], int],
-        allocate: Callable[[int], int],
-    ) -> int:
-        """Add a function's operations from places to places, with registers between them; return their number."""
+        source = np.concatenate(places) if places else np.zeros(0, int)
         begin = len(self.tape)
         value_places: list[int] = []
         registers: dict[int, int] = {}
         for node in read_operations(function):
             arguments = [value_places[k] for k in node.arguments]
             if node.operation == ca.OP_INPUT:
-                value_places.append(sources[node.place])
+                value_places.append(int(source[node.place]))
                 continue
             if node.operation == ca.OP_CONST:
-                value_places.append(place_constant(node.constant))
+                value_places.append(self.place_constant(node.constant))
                 continue
             if node.operation == ca.OP_OUTPUT:
-                operation, target = CODES[ca.OP_ASSIGN], targets[node.place]
+                operation, target = CODES[ca.OP_ASSIGN], int(targets[node.place])
             else:
                 operation, target = CODES[node.operation], registers.setdefault(node.register, len(registers))
                 target = -1 - target  # replaced below, where the number of registers is known
             value_places.append(target)
             self.tape.append((operation, target, arguments[0], arguments[-1]))
-        base = allocate(len(registers))
+        base = self.allocate(len(registers))
         for k in range(begin, len(self.tape)):
             operation, *where = self.tape[k]
             target, first, second = (base - 1 - place if place < 0 else place for place in where)
             self.tape[k] = operation, target, first, second
-        return len(registers)
+        self._add_step(phase, TAPE, begin, len(self.tape))
 
     def add_row(self, phase: int, row: Row, targets: Integers, factor: int) -> bool:
         """Add factor times a row to targets: in a step (returns True), or in the initial values if all is constant."""

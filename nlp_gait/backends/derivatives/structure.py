@@ -106,7 +106,7 @@ def _by_sample(matrices: list[SX], count: int) -> SX:
 
 # Longest function whose derivatives are all written out, if that is cheaper than one direction after the other.
 LONGEST_WRITTEN_OUT = 2000
-# Largest ratio of their lengths: tables are made once, and written out they save time in every call.
+# Largest ratio of their lengths: the source is compiled once, and written out it saves time in every call.
 MOST_GROWTH = 2.0
 
 

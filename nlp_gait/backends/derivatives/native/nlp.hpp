@@ -1,14 +1,15 @@
 // Works through a plan (see plan.py): one memory of doubles, filled step by step.
 //
-// Expects lanes.hpp and operations.hpp; the tables above it are generated.
+// Expects lanes.hpp; the tables and functions of one sample above it are generated.
 
 enum Level { NOTHING, VALUES, FIRST };  // what is known at the point that the memory holds
 enum Kind { RESET, TAPE, RUNS, PRODUCTS, CALL };
 
 struct Memory {
   Level level;
-  double* x;      // SIZE numbers
-  Vector* slots;  // of a function of one sample, BLOCK vectors each, aligned
+  double* x;     // SIZE numbers
+  Vector* in;    // what a function of one sample reads, aligned
+  Vector* out;   // and writes
   double* initial;
 };
 
@@ -18,14 +19,15 @@ static double* aligned(void* place) {
 }
 
 extern "C" EXPORT long long nlp_gait_bytes(void) {
-  return sizeof(Memory) + 2 * sizeof(Vector) + MOST_SLOTS * BLOCK * sizeof(Vector) + 2 * SIZE * sizeof(double);
+  return sizeof(Memory) + 2 * sizeof(Vector) + (MOST_IN + MOST_OUT) * sizeof(Vector) + 2 * SIZE * sizeof(double);
 }
 
 // The memory need not be aligned beyond what malloc gives.
 extern "C" EXPORT void nlp_gait_prepare(void* place) {
   Memory* memory = (Memory*)place;
-  memory->slots = (Vector*)aligned(memory + 1);
-  memory->x = (double*)(memory->slots + MOST_SLOTS * BLOCK);
+  memory->in = (Vector*)aligned(memory + 1);
+  memory->out = memory->in + MOST_IN;
+  memory->x = (double*)(memory->out + MOST_OUT);
   memory->initial = memory->x + SIZE;
   for (long long i = 0; i < SIZE; ++i) memory->initial[i] = 0.0;
   for (int i = 0; i < INITIALS; ++i) memory->initial[initial_place[i]] = initial_value[i];
@@ -33,62 +35,42 @@ extern "C" EXPORT void nlp_gait_prepare(void* place) {
   memory->level = NOTHING;
 }
 
-static void work_tape(double* x, const Operation* task, const Operation* end) {
-#define WORK(expression) r = expression; break;
-  for (; task != end; ++task) {
-    const double a = x[task->first], b = x[task->second];
+static void work_tape(double* x, const int (*tape)[4], const int (*end)[4]) {
+  for (; tape != end; ++tape) {
+    const double a = x[(*tape)[2]], b = x[(*tape)[3]];
     double r;
-    switch (task->code) { NUMBER_OPERATIONS default: r = NAN; }
-    x[task->target] = r;
+    switch ((*tape)[0]) { OPERATIONS default: r = NAN; }
+    x[(*tape)[1]] = r;
   }
-#undef WORK
 }
 
-// The same on slots of BLOCK vectors, of which the first ones are used.
-static void work_tape(Vector* slots, int used, const Operation* task, const Operation* end) {
-#define WORK(expression)                                     \
-  for (int i = 0; i < used; ++i) {                           \
-    const Vector a = firsts[i], b = seconds[i];              \
-    targets[i] = expression;                                 \
-  }                                                          \
-  break;
-  for (; task != end; ++task) {
-    const Vector *firsts = slots + task->first * BLOCK, *seconds = slots + task->second * BLOCK;
-    Vector* targets = slots + task->target * BLOCK;
-    switch (task->code) { VECTOR_OPERATIONS }
-  }
-#undef WORK
-}
-
-static void add_runs(double* x, const Run* run, const Run* end) {
+static void add_runs(double* x, const int (*run)[4], const int (*end)[4]) {
   for (; run != end; ++run) {
-    double* __restrict target = x + run->target;
-    const double* __restrict source = x + run->source;
-    const double factor = x[run->factor];
-    for (int i = 0; i < run->length; ++i) target[i] += factor * source[i];
+    double* __restrict target = x + (*run)[0];
+    const double* __restrict source = x + (*run)[1];
+    const double factor = x[(*run)[2]];
+    const int length = (*run)[3];
+    for (int i = 0; i < length; ++i) target[i] += factor * source[i];
   }
 }
 
-static void add_products(double* x, const Product* run, const Product* end) {
+static void add_products(double* x, const int (*run)[5], const int (*end)[5]) {
   for (; run != end; ++run) {
-    double* __restrict target = x + run->target;
-    const double* __restrict source = x + run->source;
-    const double factor = x[run->first] * x[run->second];
-    for (int i = 0; i < run->length; ++i) target[i] += factor * source[i];
+    double* __restrict target = x + (*run)[0];
+    const double* __restrict source = x + (*run)[1];
+    const double factor = x[(*run)[2]] * x[(*run)[3]];
+    const int length = (*run)[4];
+    for (int i = 0; i < length; ++i) target[i] += factor * source[i];
   }
 }
 
 static void call(const Memory* memory, const Call& task) {
-  const Function& function = functions[task.function];
-  double *x = memory->x, *slots = (double*)memory->slots;
-  for (int i = 0; i < function.constants; ++i)
-    for (int k = 0; k < WIDTH; ++k)
-      slots[(function.inputs + function.outputs + i) * WIDTH + k] = constants[function.first_constant + i];
+  double* x = memory->x;
   int sample = 0, direction = -1;
   for (;;) {
-    int samples[WIDTH], directions[WIDTH], count = 0;
-    while (count < WIDTH) {
-      const int most = task.directions < 0 ? 1 : all_directions[task.directions + sample];
+    int samples[LANES], directions[LANES], count = 0;
+    while (count < LANES) {
+      const int most = task.directions ? task.directions[sample] : 1;
       if (++direction >= most) {
         if (++sample >= task.count) break;
         direction = -1;
@@ -98,32 +80,32 @@ static void call(const Memory* memory, const Call& task) {
       directions[count++] = direction;
     }
     if (!count) return;
-    const int used = (count + LANES - 1) / LANES;
-    double* to = slots;
-    for (int b = task.inputs; b < task.outputs; ++b)
-      for (int i = 0; i < blocks[b].length; ++i, to += WIDTH)
-        for (int k = 0; k < used * LANES; ++k) {
-          const int pair = k < count ? k : 0;
-          to[k] = x[blocks[b].base + blocks[b].sample * samples[pair] + blocks[b].direction * directions[pair] +
-                    i * blocks[b].step];
-        }
-    work_tape(memory->slots, used, tape + function.begin, tape + function.end);
-    const double* from = slots + function.inputs * WIDTH;
-    for (int b = task.outputs; b < task.end; ++b)
-      for (int i = 0; i < blocks[b].length; ++i, from += WIDTH)
-        for (int k = 0; k < count; ++k)
-          if (!directions[k] || blocks[b].direction)
-            x[blocks[b].base + blocks[b].sample * samples[k] + blocks[b].direction * directions[k] +
-              i * blocks[b].step] = from[k];
+    Vector* in = memory->in;
+    for (const Block* block = task.inputs; block != task.outputs; in += (block++)->length)
+      for (int lane = 0; lane < LANES; ++lane) {
+        const int k = lane < count ? lane : 0;
+        const double* from = x + block->base + block->sample * samples[k] + block->direction * directions[k];
+        double* to = (double*)in + lane;
+        for (int i = 0; i < block->length; ++i) to[i * LANES] = from[i * block->step];
+      }
+    task.function(memory->in, memory->out);
+    const Vector* out = memory->out;
+    for (const Block* block = task.outputs; block != task.end; out += (block++)->length)
+      for (int lane = 0; lane < count; ++lane) {
+        if (directions[lane] && !block->direction) continue;
+        double* to = x + block->base + block->sample * samples[lane] + block->direction * directions[lane];
+        const double* from = (const double*)out + lane;
+        for (int i = 0; i < block->length; ++i) to[i * block->step] = from[i * LANES];
+      }
     if (sample >= task.count) return;
   }
 }
 
-static void work(const Memory* memory, const Step* step, const Step* end) {
+static void work(const Memory* memory, const int (*step)[3], const int (*end)[3]) {
   double* x = memory->x;
   for (; step != end; ++step) {
-    const int first = step->first, last = step->last;
-    switch (step->kind) {
+    const int first = (*step)[1], last = (*step)[2];
+    switch ((*step)[0]) {
       case RESET:
         memcpy(x + first, memory->initial + first, last * sizeof(double));
         break;

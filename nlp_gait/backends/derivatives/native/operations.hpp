@@ -1,14 +1,6 @@
-// What the tables of a plan consist of (see plan.py), and its operations on lanes (prefix v_) and on single numbers (s_).
+// The operations of operations.py on lanes (prefix v_) and on single numbers (s_).
 
-enum { BLOCK = 8, WIDTH = BLOCK * LANES };  // vectors and numbers in a slot
-
-struct Operation { int code, target, first, second; };
-struct Run { int target, source, factor, length; };
-struct Product { int target, source, first, second, length; };
-struct Step { int kind, first, last; };
-struct Block { int base, sample, length, step, direction; };
-struct Call { int function, count, directions, inputs, outputs, end; };  // directions: -1 without any
-struct Function { int begin, end, inputs, outputs, slots, first_constant, constants; };
+#define NEVER_INLINE __attribute__((noinline))
 
 static ALWAYS_INLINE Vector v_number(double s) { return Lanes(s).v; }
 static ALWAYS_INLINE double s_number(double s) { return s; }
