@@ -34,12 +34,12 @@ def repeat_steps(cycle: Signals, robot: Robot, steps: int) -> Signals:
 def join_steps(steps: Sequence[Signals], robot: Robot, places: Array) -> Signals:
     """Return a walk of steps on the left foot at x = 0, every second mirrored, from places (K, 4): x, y, z [m], yaw [rad]."""
     arrays: dict[str, list[Array]] = {name: [] for name in steps[0].arrays}
-    images: dict[int, Signals] = {}
+    mirrored: dict[int, Signals] = {}
     begin = 0.0
     for k, step in enumerate(steps):
-        if k % 2 and id(step) not in images:
-            images[id(step)] = mirror(step, robot)
-        side = images[id(step)] if k % 2 else step
+        if k % 2 and id(step) not in mirrored:
+            mirrored[id(step)] = mirror(step, robot)
+        side = mirrored[id(step)] if k % 2 else step
         for name, values in _move(side, places[k, :3], places[k, 3], begin).items():
             arrays[name].append(values if k == 0 else values[1:])
         begin += float(step.arrays["t"][-1])
@@ -54,9 +54,9 @@ def measure_step(cycle: Signals) -> float:
 
 def mirror(signals: Signals, robot: Robot) -> Signals:
     """Return time histories with left and right exchanged; torques are right for a symmetric robot."""
-    images = find_partners(robot)
-    columns = [signals.joints.index(images[name]) for name in signals.joints]
-    signs = np.array([mirror_sign(robot, name, images[name]) for name in signals.joints])
+    partners = find_partners(robot)
+    columns = [signals.joints.index(partners[name]) for name in signals.joints]
+    signs = np.array([mirror_sign(robot, name, partners[name]) for name in signals.joints])
     arrays: dict[str, Array] = {}
     for name, array in signals.arrays.items():
         if name in JOINT_ARRAYS:

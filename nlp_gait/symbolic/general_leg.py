@@ -73,8 +73,10 @@ class LegMotion(NamedTuple):
     """Angles of a leg."""
 
     joints: Motion  #: (6,) [rad] with both derivatives
-    reach: SX  #: cosine of the knee's angle from straight, by the law of cosines; above 1 the foot is out of reach
-    miss: SX  #: misfit of the torso's pose: the larger of distance and rotation times the leg's length [m]
+    knee_cosine: (
+        SX  #: cosine of the knee's angle from straight, by the law of cosines; above 1 the foot is out of reach
+    )
+    closure_error: SX  #: misfit of the torso's pose: the larger of distance and rotation times the leg's length [m]
 
 
 class _Chain(NamedTuple):
@@ -103,15 +105,15 @@ def leg_motion(leg: Leg, steps: int, torso: TorsoMotion, margin: SX, ops: Nonsmo
     bent = q if ops.exact else _keep_bent(leg, q, margin)
     chain = _build_chain(leg, ca.cos(bent), ca.sin(bent))
     off = _compute_misfit(leg, chain, hip.position, torso.rotation)
-    miss = leg.length_m * ca.sqrt(ca.fmax(ca.sumsqr(off[:3]), ca.sumsqr(off[3:])))
+    closure_error = leg.length_m * ca.sqrt(ca.fmax(ca.sumsqr(off[:3]), ca.sumsqr(off[3:])))
     factors = _factorise(leg, chain, LEAST_PIVOT if ops.exact else LEAST_PIVOT_OF_ITERATES)
     qd = factors.solve(ca.vertcat(hip.velocity / leg.length_m, torso.spin))
     linear, angular = _compute_bias(chain, qd)
     qdd = factors.solve(ca.vertcat((hip.acceleration - linear) / leg.length_m, torso.spin_rate - angular))
     if held:
-        closed = miss <= CLOSURE_TOL * leg.length_m
+        closed = closure_error <= CLOSURE_TOL * leg.length_m
         qd, qdd = (ca.vertcat(*(ca.if_else(closed, value, 0) for value in ca.vertsplit(rate))) for rate in (qd, qdd))
-    return LegMotion(Motion(q, qd, qdd), _knee_cosine(leg, ca.sumsqr(hip.position - _ankle(leg))), miss)
+    return LegMotion(Motion(q, qd, qdd), _knee_cosine(leg, ca.sumsqr(hip.position - _ankle(leg))), closure_error)
 
 
 def _keep_bent(leg: Leg, q: SX, margin: SX) -> SX:

@@ -110,7 +110,9 @@ class LegAngles(NamedTuple):
 
     #: (5,) hip roll, hip pitch, knee pitch, ankle pitch, ankle roll [rad] with velocities and accelerations
     joints: Motion
-    reach: SX  #: cosine of the knee angle by the law of cosines: above 1 the ankle is out of reach, 1 a stretched leg
+    knee_cosine: (
+        SX  #: cosine of the knee angle by the law of cosines: above 1 the ankle is out of reach, 1 a stretched leg
+    )
 
 
 def knee_cosine(distance_squared: SX, thigh: float, tibia: float) -> SX:

@@ -45,7 +45,7 @@ def leg_function(
     rate = y * pitch.acceleration + about * roll.acceleration + ca.cross(y, about) * pitch.velocity * roll.velocity
     torso = TorsoMotion(rotation, spin, rate, np.array(point_m), place)
     found = leg_motion(leg, count_newton_steps(leg), torso, SX(0.01), Exact(), held=True)
-    return leg, ca.Function("leg", [*place, *roll, *pitch], [*found.joints, found.miss, found.reach])
+    return leg, ca.Function("leg", [*place, *roll, *pitch], [*found.joints, found.closure_error, found.knee_cosine])
 
 
 @pytest.fixture(scope="module")

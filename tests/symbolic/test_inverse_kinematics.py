@@ -23,7 +23,7 @@ POSITION_TOLERANCE_M = 1e-12
 def ik(ops: Nonsmooth) -> ca.Function:
     motion = Motion(SX.sym("p", 3), SX.sym("v", 3), SX.sym("a", 3))
     leg = leg_angles(motion, THIGH, TIBIA, SX(MARGIN), ops)
-    return ca.Function("ik", list(motion), [*leg.joints, leg.reach])
+    return ca.Function("ik", list(motion), [*leg.joints, leg.knee_cosine])
 
 
 def leg_fk() -> ca.Function:
@@ -108,7 +108,7 @@ def test_a_nearly_folded_leg_of_equal_links_turns_as_a_whole() -> None:
     """Ankle and hip 3 mm apart, thigh and tibia equally long: the hip pitch goes with half the knee, as in any such leg."""
     motion = Motion(SX.sym("p", 3), SX.sym("v", 3), SX.sym("a", 3))
     leg = leg_angles(motion, THIGH, THIGH, SX(0.0), Exact())
-    function = ca.Function("equal", list(motion), [*leg.joints, leg.reach])
+    function = ca.Function("equal", list(motion), [*leg.joints, leg.knee_cosine])
     q, qd, _, _ = angles(function, np.array([0.0, 0.0, -3e-3]), np.array([0.0, 0.0, -0.01]), STILL)
     assert q[1] == pytest.approx(-q[2] / 2, abs=1e-12)
     assert qd[1] == pytest.approx(-qd[2] / 2, rel=1e-9)

@@ -74,7 +74,7 @@ class Coordinate:
     rate: str  # name of its rate's variables
     bounds: tuple[float, float]  # of the angle [rad]
     largest_rate: float  # in both directions [rad/s]
-    image: float  # +1 or -1, its factor in a mirrored motion
+    mirror_sign: float  # +1 or -1, its factor in a mirrored motion
     words: str  # description
     rate_words: str  # description of its rate
 
@@ -90,7 +90,7 @@ class Body(ABC):
     robot: Robot  # likewise, as the dynamics take it: perhaps with point masses
     joints: tuple[str, ...]  # those whose torques and rates count
     planned: tuple[str, ...]  # those whose angles are limited
-    images: tuple[str, ...]  # of every joint on the other side
+    mirrored: tuple[str, ...]  # of every joint on the other side
     # Joints of the left and the right half by ``"L"`` and ``"R"``; the root belongs to both
     leg_joints: Mapping[str, Sequence[str]]
     coordinates: tuple[Coordinate, ...]  # angles that a cycle plans besides the hip
@@ -141,8 +141,8 @@ class Body(ABC):
     @cached_property
     def mirror(self) -> tuple[list[int], Array]:
         """Columns and signs (J,) that exchange left and right in the angles or torques of all joints."""
-        signs = [mirror_sign(self.robot, *pair) for pair in zip(self.joints, self.images, strict=True)]
-        return [self.joints.index(name) for name in self.images], np.array(signs)
+        signs = [mirror_sign(self.robot, *pair) for pair in zip(self.joints, self.mirrored, strict=True)]
+        return [self.joints.index(name) for name in self.mirrored], np.array(signs)
 
     @property
     def weight(self) -> float:

@@ -75,7 +75,7 @@ def make_cycle_variables(body: Body) -> tuple[Variable, ...]:
 
 def make_cycle_planners(body: Body) -> dict[Support, Planner]:
     """Return the plans of both phases, which are continuous at touch-down."""
-    images = DM([c.image for c in body.coordinates])
+    signs = DM([c.mirror_sign for c in body.coordinates])
     mirror = SX([1, -1, 1])
 
     def read(point: InstantPoint) -> tuple[SwitchState, SwitchState, SX]:
@@ -92,7 +92,7 @@ def make_cycle_planners(body: Body) -> dict[Support, Planner]:
     def double(point: InstantPoint, phase: SX) -> PhaseMotion:
         (hip, velocity, angles, rates), landed, step = read(point)
         place = mirror * hip + vertcat(step, 0, 0)  # the mirror image of lift-off, a step further
-        end = SwitchState(place, mirror * velocity, images * angles, images * rates)
+        end = SwitchState(place, mirror * velocity, signs * angles, signs * rates)
         return PhaseMotion(landed, end, read_duration(point, Support.DOUBLE), body.standing_ankle("R", step))
 
     return {Support.SINGLE: make_planner(body, single), Support.DOUBLE: make_planner(body, double)}
@@ -245,7 +245,7 @@ def make_cycle_problem(cycle: WalkingCycle) -> GaitProblem:
 
     def reach(point: Point) -> MX:
         return ca.horzcat(
-            *(cycle.phases[p.kind].sample(cycle.read_section(p, point), Exact()).reach for p in cycle.sections)
+            *(cycle.phases[p.kind].sample(cycle.read_section(p, point), Exact()).knee_cosine for p in cycle.sections)
         )
 
     start: Start | None = partial(draw_start, names) if cycle.at_given_speed else None

@@ -101,7 +101,7 @@ class Reach(Limit):
 
     def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         limit = 1 - point[REACH_MARGIN]
-        return [make_rows_at_samples("reach", "1", samples.reach, LEGS, -limit, limit)], {}
+        return [make_rows_at_samples("reach", "1", samples.knee_cosine, LEGS, -limit, limit)], {}
 
 
 class Closure(Limit):
@@ -109,8 +109,8 @@ class Closure(Limit):
 
     def add(self, point: Point, samples: Samples, ops: Nonsmooth) -> RowsAndMetrics:
         # A gradient solver needs the same rows in the same places: there they are far below their bound.
-        miss = samples.miss if ops.exact else -MX.ones(len(LEGS), samples.steps + 1)
-        return [make_rows_at_samples("closure", "m", miss, LEGS, None, MX(CLOSURE_M))], {}
+        closure_error = samples.closure_error if ops.exact else -MX.ones(len(LEGS), samples.steps + 1)
+        return [make_rows_at_samples("closure", "m", closure_error, LEGS, None, MX(CLOSURE_M))], {}
 
 
 class DriveLimits(Limit):

@@ -74,7 +74,7 @@ def make_phase_problem(name: str, title: str, phase: Phase, *, searchable: bool 
     """Return the problem of one phase, whose name and title lack the robot's; not ``searchable``, it needs gradients."""
     start = phase.start
     if not phase.body.closed_form:
-        start = make_start_within_reach(phase, (), lambda point: phase.sample(point, Exact()).reach, start)
+        start = make_start_within_reach(phase, (), lambda point: phase.sample(point, Exact()).knee_cosine, start)
     return make_gait_problem(phase, name, title, SolverHints(start=start, searchable=searchable))
 
 

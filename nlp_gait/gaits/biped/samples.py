@@ -25,9 +25,9 @@ class Instant(NamedTuple):
     joints: Mapping[str, Motion]  # motion of every joint by name [rad]
     hip: SX  # (3,) position of the torso's origin [m]
     ankles: Mapping[str, SX]  # (3,) positions by side ``"L"``, ``"R"`` [m]
-    reach: SX = SX(0, 1)  # (2,) cosines of the left and the right knee
+    knee_cosine: SX = SX(0, 1)  # (2,) cosines of the left and the right knee
     yaw: SX = SX(0, 1)  # (1,) yaw of the right foot, from the left one's [rad]; empty where both point forward
-    miss: SX = SX(0, 1)  # (k,) distances by which legs miss their feet [m]; empty where they cannot
+    closure_error: SX = SX(0, 1)  # (k,) distances by which legs miss their feet [m]; empty where they cannot
     attitude: SX = SX(0, 1)  # (4,) of the torso, a unit quaternion (w, x, y, z); empty where it is upright
     arm_angle: SX = SX(0, 1)  # (k,) of the arms that swing [rad]
     heights: SX = SX(0, 1)  # (4,) of the corners of a right sole that may tilt [m]; empty where it stays flat
@@ -92,13 +92,13 @@ class Samples:
 
     #: (k, N + 1) planned angles [rad]
     planned = Quantity(lambda phase, now: _stack(now, phase.body.planned, 0), of_motion=True)
-    reach = Quantity(lambda _, now: now.reach, of_motion=True)  #: (2, N + 1) cosines of the knees
+    knee_cosine = Quantity(lambda _, now: now.knee_cosine, of_motion=True)  #: (2, N + 1) cosines of the knees
     torque = Quantity(lambda phase, now: ca.vertcat(*(now.torques[n] for n in phase.body.joints)))  #: (J, N + 1) [Nm]
     #: (m, N + 1) mechanical power of the joints that move [W], signed
     power = Quantity(lambda phase, now: ca.vertcat(*(now.joints[n].velocity * now.torques[n] for n in phase.moving)))
     zmp = Quantity(lambda _, now: now.zmp)  #: (2, N + 1) ZMP in the world [m]
     #: (k, N + 1) distances by which legs miss their feet [m]; empty where they cannot
-    miss = Quantity(lambda _, now: now.miss, of_motion=True)
+    closure_error = Quantity(lambda _, now: now.closure_error, of_motion=True)
     q = Quantity(lambda phase, now: _stack(now, phase.moving, 0))  #: (m, N + 1) angles of the joints that move [rad]
     qd = Quantity(lambda phase, now: _stack(now, phase.moving, 1))  #: (m, N + 1) their velocities [rad/s]
     qdd = Quantity(lambda phase, now: _stack(now, phase.moving, 2))  #: (m, N + 1) their accelerations [rad/s^2]
@@ -156,7 +156,14 @@ class Samples:
         return self.wrench_left if side == "L" else self.wrench_right
 
 
-USUAL = (Samples.planned, Samples.reach, Samples.torque, Samples.power, Samples.zmp, Samples.miss)  # of every phase
+USUAL = (
+    Samples.planned,
+    Samples.knee_cosine,
+    Samples.torque,
+    Samples.power,
+    Samples.zmp,
+    Samples.closure_error,
+)  # of every phase
 
 
 class SampledMotion:

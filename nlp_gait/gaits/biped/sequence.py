@@ -54,8 +54,8 @@ def limit_torque_jump(
 
     Positions and rates are continuous. With ``mirrored`` the mirror image of the phase follows, as after the last one of a cycle.
     """
-    images, signs = body.mirror
-    first = DM(signs) * after.torque[images, 0] if mirrored else after.torque[:, 0]
+    partners, signs = body.mirror
+    first = DM(signs) * after.torque[partners, 0] if mirrored else after.torque[:, 0]
     jump, limit, name = first - before.torque[:, -1], point[TORQUE_JUMP], f"{switch}_torque_jump"
     row = make_rows(name, "Nm", jump, -limit, limit, body.joints, "once", body.torque_scale)
     return row, {f"{name}_Nm": ca.mmax(ca.fabs(jump))}

@@ -173,16 +173,16 @@ class WholeWalk(PhaseSequence):
         """Values of a state in the order of ``make_state_variables``, seen from the standing foot."""
         coordinates, left_y = self.body.coordinates, self.body.feet_y[0]
         if end.state is None:  # between both feet, in the mean of their directions
-            symmetric = [point[f"{c.name}_{STAND}_rad"] if c.image > 0 else 0 for c in coordinates]
+            symmetric = [point[f"{c.name}_{STAND}_rad"] if c.mirror_sign > 0 else 0 for c in coordinates]
             ahead = landed._replace(yaw=landed.yaw / 2).turn(point[f"hip_x_{STAND}_m"], 0.0)
             place = [middle / 2 + offset for middle, offset in zip((landed.x, landed.y + left_y), ahead, strict=True)]
             return [*place, point[f"hip_z_{STAND}_m"], 0, 0, 0, *(v for angle in symmetric for v in (angle, 0))]
         x, y, z, vx, vy, vz, *angles = (point[v.name] for v in end.state.make_variables(self.body))
         if not end.mirrored:
             return [x, y, z, vx, vy, vz, *angles]
-        images = [c.image for c in coordinates for _ in range(2)]
+        signs = [c.mirror_sign for c in coordinates for _ in range(2)]
         (place_x, place_y), velocity = landed.turn(x, left_y - y), landed.turn(vx, -vy)
-        mirrored = (image * angle for image, angle in zip(images, angles, strict=True))
+        mirrored = (sign * angle for sign, angle in zip(signs, angles, strict=True))
         return [landed.x + place_x, landed.y + place_y, z + self.rise_m, *velocity, vz, *mirrored]
 
     def signals(self, point: NumericPoint) -> Signals:

@@ -110,7 +110,7 @@ def make_walk_variables(body: Body, sections: Sequence[MotionSection], *, equal:
 
 def make_pose_variables(body: Body) -> list[Variable]:
     """Return the variables of the pose at both ends: symmetric and at rest, so that the other coordinates are zero."""
-    free = {"hip_x", "hip_z", *(c.name for c in body.coordinates if c.image > 0)}
+    free = {"hip_x", "hip_z", *(c.name for c in body.coordinates if c.mirror_sign > 0)}
     states = make_state_variables(body, STAND, "lift_off")
     return [
         replace(variable, description=variable.description.replace("at stand", "standing"))

@@ -92,7 +92,7 @@ class Humanoid(Body):
         rate = side * pitch.acceleration + about * roll.acceleration
         rate += ca.cross(side, about) * (pitch.velocity * roll.velocity)
         joints: dict[str, Motion] = {}
-        reach, miss = [], []
+        knee_cosines, closure_errors = [], []
         for letter, name in BOTH_FEET.items():
             leg = self.biped.legs[name]
             place = Motion(*(a - b for a, b in zip(hip, ankles[letter], strict=True)))
@@ -102,8 +102,8 @@ class Humanoid(Body):
                 torso = general_leg.turn_torso(torso, angles[TORSO_YAW], foot)
             motion = general_leg.leg_motion(leg, self.newton_steps[name], torso, margin, ops, held=ops.exact)
             joints |= {joint: Motion(*(order[i] for order in motion.joints)) for i, joint in enumerate(leg.joints)}
-            reach.append(motion.reach)
-            miss.append(motion.miss)
+            knee_cosines.append(motion.knee_cosine)
+            closure_errors.append(motion.closure_error)
         half_roll, half_pitch = roll.position / 2, pitch.position / 2
         attitude = [
             ca.cos(half_pitch) * ca.cos(half_roll),
@@ -119,8 +119,8 @@ class Humanoid(Body):
             joints=joints,
             hip=hip.position - rotation @ DM(middle),
             ankles={letter: ankle.position for letter, ankle in ankles.items()},
-            reach=ca.vertcat(*reach),
-            miss=ca.vertcat(*miss) if ops.exact else SX(0, 1),
+            knee_cosine=ca.vertcat(*knee_cosines),
+            closure_error=ca.vertcat(*closure_errors) if ops.exact else SX(0, 1),
             attitude=ca.vertcat(*attitude),
             yaw=angles[RIGHT_YAW].position if TORSO_YAW in angles else SX(0, 1),
         )
@@ -159,7 +159,7 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, limits: str | AddedL
         robot=biped.model,
         joints=biped.joints,
         planned=biped.joints,
-        images=(*right.joints, *left.joints),
+        mirrored=(*right.joints, *left.joints),
         leg_joints={side: biped.legs[foot].joints for side, foot in BOTH_FEET.items()},
         coordinates=tuple(
             Coordinate(
@@ -167,11 +167,11 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, limits: str | AddedL
                 rate=f"{name}_rate",
                 bounds=(-largest, largest),
                 largest_rate=rate,
-                image=image,
+                mirror_sign=sign,
                 words=name.replace("_", " "),
                 rate_words=f"rate of the {name.replace('_', ' ')}",
             )
-            for (name, largest), image in zip(LARGEST_LEAN.items(), (-1.0, 1.0), strict=True)
+            for (name, largest), sign in zip(LARGEST_LEAN.items(), (-1.0, 1.0), strict=True)
         ),
         upright=frozenset(foot.link for foot in biped.model.feet.values()),
         gravity=GRAVITY,

@@ -121,7 +121,7 @@ ARM_COORDINATE = Coordinate(
     rate="arm_rate",
     bounds=(-LARGEST_SWING, LARGEST_SWING),
     largest_rate=LARGEST_RATE,
-    image=-1.0,
+    mirror_sign=-1.0,
     words="left shoulder pitch above the middle, right one below it",
     rate_words="rate of the arms' swing",
 )
@@ -182,7 +182,7 @@ class NaoBody(Body):
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
         """Return the motion of the whole robot under an upright torso: closed-form legs between the hip and both ankles."""
         joints: dict[str, Motion] = {}
-        reach = []
+        knee_cosines = []
         for side, ankle in ankles.items():
             geometry = measure_leg(self.robot, side)
             (ankle_at, *rates), (hip_at, *hip_rates) = ankle, hip
@@ -192,14 +192,14 @@ class NaoBody(Body):
             rows = (Motion(*(order[i] for order in leg.joints)) for i in range(len(LEG_JOINTS)))
             joints |= {f"{side}HipYawPitch": constant_motion(0.0)}
             joints |= {f"{side}{name}": row for name, row in zip(LEG_JOINTS, rows, strict=True)}
-            reach.append(leg.reach)
+            knee_cosines.append(leg.knee_cosine)
         joints |= {name: constant_motion(angle) for name, angle in RESTING_ARM_ANGLES.items()}
         places = {side: ankle.position for side, ankle in ankles.items()}
         return Instant(
             joints={**joints, **angles},
             hip=hip.position,
             ankles=places,
-            reach=vertcat(*reach),
+            knee_cosine=vertcat(*knee_cosines),
             arm_angle=vertcat(*(motion.position for motion in angles.values())),
         )
 
@@ -265,7 +265,7 @@ def make_nao(
         robot=simulated if rotational_inertia else make_point_masses(simulated),
         joints=JOINTS,
         planned=PLANNED_JOINTS,
-        images=tuple(map(find_partner, JOINTS)),
+        mirrored=tuple(map(find_partner, JOINTS)),
         leg_joints={side: tuple(joint for joint in JOINTS if joint.startswith(side)) for side in "LR"},
         coordinates=(ARM_COORDINATE,),
         # Torso, soles, and hips whose yaw-pitch joint is held at zero keep the world's axes.

@@ -99,7 +99,7 @@ def place_on_left_foot(phase: Phase, joints: Mapping[str, Motion]) -> Instant:
         joints=joints,
         hip=places.torso,
         ankles={"L": SX(DM(body.support)), "R": places.ankle},
-        reach=ca.vertcat(*(ca.cos(joints[knee].position) for knee in KNEES)),
+        knee_cosine=ca.vertcat(*(ca.cos(joints[knee].position) for knee in KNEES)),
         heights=places.corners[2, :].T,
         sides=places.corners[1, 1::2].T,
     )

@@ -245,4 +245,4 @@ def _solve_leg(at_hip: Motion, at_ankle: Motion, margin: SX, ops: Nonsmooth) -> 
     leg = leg_angles(hip_to_ankle, get_rod("HK").length_m, get_rod("KA").length_m, margin, ops)
     _, pitch, knee, _, _ = (Motion(*(order[i] for order in leg.joints)) for i in range(5))
     upright = constant_motion(ca.pi / 2)  # a leg that hangs down
-    return stack(add_motions(pitch, upright), add_motions(add_motions(pitch, knee), upright)), leg.reach
+    return stack(add_motions(pitch, upright), add_motions(add_motions(pitch, knee), upright)), leg.knee_cosine
