@@ -80,11 +80,11 @@ def main() -> None:
     entries: dict[str, dict[str, Any]] = {}  # by description; equal problems of different names share their values
     for problem, x, found_by, proven_as in (*from_gaitbench(), *from_difficulty(), *from_files(), *from_certificates()):
         if len(x) != len(problem.names):
-            print(f"{problem.address}: the point has {len(x)} values instead of {len(problem.names)}")
+            print(f"{problem.load_name}: the point has {len(x)} values instead of {len(problem.names)}")
             continue
         values = build_exact_model(problem).at(np.array(x), problem.p)
         if not values.violation <= FEASIBILITY_TOLERANCE:
-            print(f"{problem.address}: the point found by {found_by} is infeasible by {values.violation:.3g}")
+            print(f"{problem.load_name}: the point found by {found_by} is infeasible by {values.violation:.3g}")
             continue
         problem_part, cost = identify_problem(problem), values.cost
         equal = (entry for entry in entries.values() if not describe_difference(entry["problem"], problem_part))
@@ -97,7 +97,7 @@ def main() -> None:
             best = {"objective": problem.objective.sign * cost, "x": list(x), "found_by": found_by}
             best |= {"bound": bound, "proven_as": name}
             print(
-                f"{problem.address} {dict(problem.values)}: {best['objective']:.9g}, was {before and before['objective']}"
+                f"{problem.load_name} {dict(problem.values)}: {best['objective']:.9g}, was {before and before['objective']}"
             )
             for entry in entries.values():
                 if not describe_difference(entry["problem"], problem_part):

@@ -71,7 +71,7 @@ def evaluate(
     dense_values = None if dense is None else build_exact_model(dense).at(point, dense.p)
     objective = problem.objective
     return Evaluation(
-        problem=problem.address,
+        problem=problem.load_name,
         options=dict(problem.options),
         parameters=dict(problem.values),
         x=problem.by_name(point),

@@ -132,7 +132,7 @@ def _describe_problem(name: str, options: Mapping[str, Any]) -> Output:
     from nlp_gait.formulation.registry import describe_options, find_maker, list_choices
 
     problem = nlp_gait.load(name, **options)
-    make = find_maker(problem.address)
+    make = find_maker(problem.load_name)
     words, choices = describe_options(make), list_choices(make)
     where = "".join(f" with --{key} {value}" for key, value in options.items())
     variables = [(v.name, f"{v.lower:g}", f"{v.upper:g}", v.unit, v.description) for v in problem.variables]

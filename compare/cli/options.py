@@ -44,14 +44,14 @@ class ProblemOptions:
     def make_spec(self, name: str) -> ProblemSpec:
         """Return the problem of that name with these values; raises UnknownNameError, and InputError for bad values."""
         spec, given = ProblemSpec(name=name), dict(parse_pairs(self.values, "--set"))
-        maker_options = inspect.signature(find_maker(spec.address)).parameters
-        options = parse_options(spec.address, [(key, text) for key, text in given.items() if key in maker_options])
+        maker_options = inspect.signature(find_maker(spec.load_name)).parameters
+        options = parse_options(spec.load_name, [(key, text) for key, text in given.items() if key in maker_options])
         if self.robot is not None:
             options["robot"] = self.robot
         if self.limits:
             if "limits" not in maker_options:
                 raise InputError(f"{name} takes no limits, those of NAO and of humanoids do; leave out --limit")
-            options |= parse_options(spec.address, [("limits", ",".join(self.limits))])
+            options |= parse_options(spec.load_name, [("limits", ",".join(self.limits))])
         spec = spec.with_options(**options)
         problem = spec.load()
         numbers = {key: parse_number(key, text, "--set") for key, text in given.items() if key not in maker_options}

@@ -91,7 +91,7 @@ def _describe(solution: Solution) -> Iterator[str | Rows]:
     problem, best = solution.problem, solution.best
     value = with_unit(solution.objective, problem.objective.unit)
     words = f"{problem.objective.name} {value}" if solution.feasible else "no feasible point was found"
-    yield f"{problem.address}: {words} ({solution.status})"
+    yield f"{problem.load_name}: {words} ({solution.status})"
     kind = "Optimum" if solution.converged else "Best feasible point" if solution.feasible else "Least infeasible point"
     x, active = list(solution.x.items()), solution.active_constraints
     if len(x) > SHOWN_VARIABLES:

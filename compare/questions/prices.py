@@ -51,7 +51,7 @@ def perturb_robot(problem: GaitProblem, values: Mapping[str, float]) -> GaitProb
     """Return the problem with other values of its robot's quantities; errors in a robot's data do not move the limits."""
     name, changes = split_name(str(problem.options["robot"]))
     robot = name_perturbed(name, {**changes, **values})
-    spec = ProblemSpec(name=problem.address, options={**problem.options, "robot": robot}, values=problem.values)
+    spec = ProblemSpec(name=problem.load_name, options={**problem.options, "robot": robot}, values=problem.values)
     return spec.load().with_values(**problem.parameter_values)
 
 

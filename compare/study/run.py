@@ -76,14 +76,14 @@ class ProblemSpec:
                 object.__setattr__(self, "options", {**instance, **self.options})
 
     @property
-    def address(self) -> str:
+    def load_name(self) -> str:
         """Name from which the problem is loaded."""
-        return self.name if isinstance(self.name, str) else self.name.address
+        return self.name if isinstance(self.name, str) else self.name.load_name
 
     @property
     def title(self) -> str:
         """Name in a study."""
-        return self.label or (self.address if self.address in PROBLEMS else shorten_name(self.address))
+        return self.label or (self.load_name if self.load_name in PROBLEMS else shorten_name(self.load_name))
 
     def with_options(self, **options: str | int | float | bool) -> "ProblemSpec":
         """Return a copy with further options."""
@@ -94,7 +94,7 @@ class ProblemSpec:
         if isinstance(self.name, GaitProblem):
             if self.options:
                 raise InputError(
-                    f"problem {self.address!r} is already built; options are not allowed: {', '.join(self.options)}"
+                    f"problem {self.load_name!r} is already built; options are not allowed: {', '.join(self.options)}"
                 )
             return self.name.with_values(**self.values)
         check_options(find_maker(self.name), self.options)  # before the cache, to which True and 1 are the same
@@ -307,7 +307,7 @@ def check_repeatable(problem: ProblemSpec) -> None:
 
 def describe_problem(problem: GaitProblem) -> dict[str, Any]:
     """Return name, options and changed parameter values of a problem, as plain data for ``load_result``."""
-    return {"problem": problem.address, "options": dict(problem.options), "parameters": dict(problem.values)}
+    return {"problem": problem.load_name, "options": dict(problem.options), "parameters": dict(problem.values)}
 
 
 def describe_settings(settings: Any) -> dict[str, Any]:

@@ -199,7 +199,7 @@ def hash_json(data: Any) -> str:
 def identify_problem(problem: GaitProblem) -> dict[str, Any]:
     """Return how to load a problem, and what it was made of; of a problem that no name loads, a hash of its formulas."""
     changed = {q.name: v for q, v in zip(problem.parameters, problem.p.tolist(), strict=True) if v != q.default}
-    identity: dict[str, Any] = {"name": problem.address, "options": dict(problem.options), "parameters": changed}
+    identity: dict[str, Any] = {"name": problem.load_name, "options": dict(problem.options), "parameters": changed}
     identity["mathematics"] = problem.mathematics
     files = dict(problem.files) if problem.has_origin else {"formulas": problem.build_once(hash_formulas)}
     return {**identity, "files": files} if files else identity

@@ -181,7 +181,7 @@ def write_signals_json(path: Path, result: Result, signals: Signals) -> None:
     problem = result.problem
     data = {
         "schema": SCHEMA,
-        "problem": problem.address,
+        "problem": problem.load_name,
         "options": dict(problem.options),
         "parameters": dict(problem.values),
         "x": problem.by_name(result.x),

@@ -119,7 +119,7 @@ class GaitProblem:
     def __repr__(self) -> str:
         goal, n = self.objective, len(self.variables)
         counts = f"{n} variable{'s' * (n > 1)}, {len(self.own_parameters)} parameters"
-        text = f"{self.address}: {goal.sense} {goal.name} [{goal.unit}] over {counts}"
+        text = f"{self.load_name}: {goal.sense} {goal.name} [{goal.unit}] over {counts}"
         return f"<{text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 3] + '...'}>"
 
     def describe(self) -> str:
@@ -127,7 +127,7 @@ class GaitProblem:
         variables = [(v.name, f"{low:g}", f"{high:g}", v.unit, v.description) for v, low, high in
                      zip(self.variables, self.lower.tolist(), self.upper.tolist(), strict=True)]  # fmt: skip
         parameters = [(q.name, f"{self.value(q.name):g}", q.unit, q.description) for q in self.own_parameters]
-        blocks = [f"{self.address}: {self.title}", repr(self)[1:-1].partition(": ")[2]]
+        blocks = [f"{self.load_name}: {self.title}", repr(self)[1:-1].partition(": ")[2]]
         for header, rows in (
             (("variable", "lower", "upper", "unit", ""), variables),
             (("parameter", "value", "unit", ""), parameters),
@@ -147,13 +147,13 @@ class GaitProblem:
         return self.hints.searchable
 
     @property
-    def address(self) -> str:
+    def load_name(self) -> str:
         """Argument of ``load``, written into files of results."""
         return self.loaded_as or self.name
 
     @property
     def has_origin(self) -> bool:
-        """Whether ``load`` makes the same problem from its address and options."""
+        """Whether ``load`` makes the same problem from its load name and options."""
         plain = (str, int, float, bool)
         return self._origin is not None and all(isinstance(value, plain) for value in self._origin[1].values())
 

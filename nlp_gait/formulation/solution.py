@@ -187,7 +187,7 @@ class Solution:
         goal = self.problem.objective
         value = f"{goal.name} {self.objective:.6g} {goal.unit}" if self.feasible else "infeasible"
         counts = f"{sum(start.converged for start in self.starts)} of {len(self.starts)} starts"
-        return f"<Solution of {self.problem.address}: {value}; {counts} of {self.best.solver} converged>"
+        return f"<Solution of {self.problem.load_name}: {value}; {counts} of {self.best.solver} converged>"
 
     def signals(self) -> Signals:
         """Return time histories at x; raises InputError if the problem has none."""
@@ -219,7 +219,7 @@ class Solution:
         ]
         return {
             "schema": 1,
-            "problem": problem.address,
+            "problem": problem.load_name,
             "options": dict(problem.options),
             "parameters": dict(problem.values),
             "objective_name": problem.objective.name,

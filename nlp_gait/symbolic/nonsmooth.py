@@ -40,7 +40,7 @@ class Root:
     lift: bool  #: whether ``Lifted`` makes the unknown a variable; otherwise it differentiates through ``newton``
 
 
-class OpenRoots(NamedTuple):
+class ImplicitVariables(NamedTuple):
     """Equations of one instant that rows must tie, one below the other."""
 
     unknowns: SX  #: (n,) symbols
@@ -60,12 +60,12 @@ class Nonsmooth:
         """Return the solution (n,) of an equation of one instant, for its inputs."""
         return root.newton(inputs)
 
-    def open_roots(self) -> OpenRoots | None:
+    def collect_implicit_variables(self) -> ImplicitVariables | None:
         """Return and forget the equations of the last instant whose unknowns are still symbols; None if there are none."""
         return None
 
-    def tie_roots(self, start: MX, residual: Callable[[MX], MX]) -> MX:
-        """Return the unknowns (n, N) of N instants, tied by residual(unknowns) = 0, near a start (n, N); see ``open_roots``."""
+    def add_implicit_variables(self, start: MX, residual: Callable[[MX], MX]) -> MX:
+        """Return the unknowns (n, N) of N instants, tied by residual(unknowns) = 0, near a start (n, N)."""
         return start
 
     def acos(self, argument: SX, margin: SX) -> Angle:
@@ -154,22 +154,22 @@ class Lifted(Nonsmooth):
         self.width = width
         self.lifts: list[Lift] = []
         self.smoothed = False
-        self._open: list[OpenRoots] = []
+        self._implicit: list[ImplicitVariables] = []
 
     def root(self, root: Root, inputs: SX) -> SX:
         """Return a symbol that a row must tie; or the result of Newton's method, to be differentiated."""
         solution = root.newton(inputs)
         if not root.lift:
             return solution
-        unknowns = SX.sym(f"unknown_{len(self._open)}", solution.shape[0])
-        self._open.append(OpenRoots(unknowns, root.residual(unknowns, inputs), solution))
+        unknowns = SX.sym(f"unknown_{len(self._implicit)}", solution.shape[0])
+        self._implicit.append(ImplicitVariables(unknowns, root.residual(unknowns, inputs), solution))
         return unknowns
 
-    def open_roots(self) -> OpenRoots | None:
-        roots, self._open = self._open, []
-        return OpenRoots(*(ca.vertcat(*columns) for columns in zip(*roots, strict=True))) if roots else None
+    def collect_implicit_variables(self) -> ImplicitVariables | None:
+        roots, self._implicit = self._implicit, []
+        return ImplicitVariables(*(ca.vertcat(*columns) for columns in zip(*roots, strict=True))) if roots else None
 
-    def tie_roots(self, start: MX, residual: Callable[[MX], MX]) -> MX:
+    def add_implicit_variables(self, start: MX, residual: Callable[[MX], MX]) -> MX:
         return self._lift("root", start, residual, tight=True)
 
     def acos(self, argument: SX, margin: SX) -> Angle:

@@ -155,7 +155,7 @@ def test_a_problem_is_pickled_as_its_maker_options_and_values(make: Callable[[],
     text = pickle.dumps(problem)
     assert len(text) < 20_000
     again = pickle.loads(text)
-    assert (again.address, again.options, again.values) == (problem.address, problem.options, problem.values)
+    assert (again.load_name, again.options, again.values) == (problem.load_name, problem.options, problem.values)
     first, second = (made.start_point(np.random.default_rng(0)) for made in (problem, again))
     assert np.array_equal(first, second) and evaluate(problem, first).violation == evaluate(again, first).violation
     assert build_exact_model(pickle.loads(text)) is build_exact_model(again)  # built once

@@ -33,7 +33,7 @@ GOOD: dict[str, Any] = {"name": "knee", "unit": "m", "scale": 0.01, "value": MX.
 
 def test_a_maker_in_a_file_is_loaded_with_its_options_and_solved() -> None:
     problem = load(f"{EXAMPLE}:two_link", intervals=10)
-    assert problem.name == "two-link" and problem.address == f"{EXAMPLE}:two_link"
+    assert problem.name == "two-link" and problem.load_name == f"{EXAMPLE}:two_link"
     assert problem.options == {"intervals": 10, "lift_m": 0.05}
     assert solve(problem, starts=2).converged
     with pytest.raises(UnknownNameError, match="did you mean 'intervals'"):
@@ -68,7 +68,7 @@ def test_a_result_file_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="needs your code 'elsewhere/other.py:leg', which runs only if you name it"):
         load_result(tmp_path / "best.json")
     load(f"{file}:leg")
-    assert load_result(tmp_path / "best.json").problem.address == f"{file}:leg"
+    assert load_result(tmp_path / "best.json").problem.load_name == f"{file}:leg"
 
 
 @pytest.mark.parametrize(

@@ -142,15 +142,15 @@ def test_a_root_is_newtons_result_or_a_variable_that_an_equation_ties() -> None:
     root = Root(residual=lambda x, inputs: x**2 - inputs, newton=newton, lift=True)
     number = SX.sym("number")
     assert float(ca.Function("f", [number], [Exact().root(root, number)])(2.0)) == pytest.approx(2.0**0.5, abs=1e-15)
-    assert Exact().open_roots() is None
+    assert Exact().collect_implicit_variables() is None
     ops = Lifted(MX(1e-3))
     unknown = ops.root(root, number)
-    opened = ops.open_roots()
-    assert opened is not None and ops.open_roots() is None
+    opened = ops.collect_implicit_variables()
+    assert opened is not None and ops.collect_implicit_variables() is None
     assert unknown.is_symbolic() and float(ca.Function("s", [number], [opened.start])(2.0)) == pytest.approx(2.0**0.5)
     instant = ca.Function("instant", [opened.unknowns, number], [opened.residual])
     numbers = ca.DM([[2.0, 3.0]])
-    solved = ops.tie_roots(MX(ca.DM([[1.4, 1.7]])), lambda x: instant.map(2)(x, numbers))
+    solved = ops.add_implicit_variables(MX(ca.DM([[1.4, 1.7]])), lambda x: instant.map(2)(x, numbers))
     assert solved.shape == (1, 2)
     (lift,) = ops.lifts
     assert lift.tight
@@ -158,4 +158,4 @@ def test_a_root_is_newtons_result_or_a_variable_that_an_equation_ties() -> None:
     np.testing.assert_allclose(np.array(rows([2.0**0.5, 3.0**0.5])), 0.0, atol=1e-15)
     np.testing.assert_allclose(np.array(rows([2.0, 2.0])).ravel(), [2.0, 1.0])
     unlifted = Root(residual=root.residual, newton=newton, lift=False)
-    assert not ops.root(unlifted, number).is_symbolic() and ops.open_roots() is None
+    assert not ops.root(unlifted, number).is_symbolic() and ops.collect_implicit_variables() is None

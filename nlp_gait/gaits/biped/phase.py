@@ -264,9 +264,9 @@ class Phase:
             )
         inputs, plan = self._symbolic_plan(ops)
         now = self.loads(plan)
-        roots = ops.open_roots()
+        implicit = ops.collect_implicit_variables()
         unknowns: list[MX] = []  # columns of the open equations' unknowns, if there are any
-        symbols = [] if roots is None else [roots.unknowns]
+        symbols = [] if implicit is None else [implicit.unknowns]
 
         def evaluate(quantities: Sequence[Quantity], *first: SX) -> list[MX]:
             outputs = [*first, *(quantity.measure(self, now) for quantity in quantities)]
@@ -275,19 +275,18 @@ class Phase:
             )
 
         motion = SampledMotion(evaluate, len(points))
-        if roots is None:
+        if implicit is None:
             motion.store(self.usual, evaluate(self.usual))
             return motion
-        residual = roots.residual
-        (start,) = self._map(ca.Function("start", inputs, simplify([roots.start])), points, phases=phases)
+        (start,) = self._map(ca.Function("start", inputs, simplify([implicit.start])), points, phases=phases)
 
-        def tie(columns: MX) -> MX:
+        def residual(columns: MX) -> MX:
             unknowns.append(columns)
-            rows, *values = evaluate(self.usual, residual)
+            rows, *values = evaluate(self.usual, implicit.residual)
             motion.store(self.usual, values)
             return rows
 
-        ops.tie_roots(start, tie)
+        ops.add_implicit_variables(start, residual)
         return motion
 
     def _make_stages(self, planned: tuple[list[SX], Instant], quantities: Sequence[Quantity]) -> "Stages":

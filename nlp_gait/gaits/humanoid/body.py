@@ -34,9 +34,9 @@ UPRIGHT = 0.9  # vertical component of the axis of a joint that turns a leg
 LARGEST_LEAN = dict(zip(LEAN, (0.15, 0.3), strict=True))
 LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
 # Nearly all poses are closed to this [1, rad] before the last Newton step, which squares the rest.
-NEARLY_CLOSED, CLOSED, SHARE = 1e-9, 1e-12, 0.995
+LARGEST_RESIDUAL, CLOSURE_TOL, SHARE = 1e-9, 1e-12, 0.995
 MOST_STEPS = 8
-LEAST_CLOSED = 0.95  # share of poses
+LEAST_CLOSED_SHARE = 0.95  # share of poses
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -203,22 +203,22 @@ def count_newton_steps(leg: Leg) -> int:
     steps = _find_steps(leg, inputs)
     if steps is not None:
         return steps
-    closed = compute_residuals(leg, MOST_STEPS - 1, inputs) <= NEARLY_CLOSED
-    if np.mean(closed) >= LEAST_CLOSED and (steps := _find_steps(leg, inputs[:, closed])) is not None:
+    closed = compute_residuals(leg, MOST_STEPS - 1, inputs) <= LARGEST_RESIDUAL
+    if np.mean(closed) >= LEAST_CLOSED_SHARE and (steps := _find_steps(leg, inputs[:, closed])) is not None:
         return steps
     raise InputError(
         f"the leg of joints {', '.join(leg.joints)} is not solved in {MOST_STEPS} Newton steps: its hip axes pass each other too "
         f"far, or its ankle's; after {MOST_STEPS - 1} steps {np.mean(closed):.0%} of {general_leg.POSES} poses are closed, and "
-        f"{LEAST_CLOSED:.0%} must be"
+        f"{LEAST_CLOSED_SHARE:.0%} must be"
     )
 
 
 def _find_steps(leg: Leg, inputs: Array) -> int | None:
     for steps in range(MOST_STEPS):
         left = compute_residuals(leg, steps, inputs)
-        if steps == 0 and np.quantile(left, SHARE) <= CLOSED:
+        if steps == 0 and np.quantile(left, SHARE) <= CLOSURE_TOL:
             return 0
-        if np.quantile(left, SHARE) <= NEARLY_CLOSED:
+        if np.quantile(left, SHARE) <= LARGEST_RESIDUAL:
             return steps + 1
     return None
 
