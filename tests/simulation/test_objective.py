@@ -39,6 +39,8 @@ def test_a_score_is_the_energy_of_a_simulation(cycle: Result, arena: Arena) -> N
     assert score.off == pytest.approx(
         math.hypot(1.0 - walk.walked_m / walk.planned_m, (walk.drift_m or 0.0) / walk.planned_m)
     )
+    beyond = replace(score, off=0.116, slip_m=0.02).list_excesses()
+    assert not score.list_excesses() and beyond == ["11.6 % off its way", "a foot slips by 20.0 mm"]
 
 
 def test_a_fall_is_worse_than_anything_else_and_worst_if_early(cycle: Result) -> None:
@@ -46,13 +48,6 @@ def test_a_fall_is_worse_than_anything_else_and_worst_if_early(cycle: Result) ->
     early, late = (Arena(cycle.problem, steps=STEPS, conditions=Conditions(push=p)).score(cycle.x) for p in pushes)
     assert early.fell_at_s is not None and late.fell_at_s is not None and early.fell_at_s < late.fell_at_s
     assert 2.0 > early.violation > late.violation > 1.0
-
-
-def test_what_a_gait_does_beyond_what_it_may_is_said(cycle: Result, arena: Arena) -> None:
-    score = arena.score(cycle.x)
-    assert not score.list_excesses()
-    wide = replace(score, off=0.116, slip_m=0.02)
-    assert wide.list_excesses() == ["11.6 % off its way", "a foot slips by 20.0 mm"]
 
 
 def test_searches_run_on_it_with_any_number_of_threads(cycle: Result, arena: Arena) -> None:
