@@ -60,7 +60,7 @@ SETTINGS = {
 
 
 def tuned() -> Iterator[str]:
-    """Cycles tuned in the engine: NAO's in four settings, JVRC-1's in two; six hours of processor time."""
+    """Cycles tuned in the engine: NAO's in four settings, JVRC-1's in two; ten hours of processor time."""
     yield from _tabulate(SETTINGS)
 
 
