@@ -22,7 +22,7 @@ from nlp_gait.simulation.simulate import Conditions
 
 FOLDER = Path("tuned")
 LIMITS = (Axis(name="ssp_dbm_y_mean_limit_m", values=(0.003, 0.006, 0.01, 0.015, 0.02)),)
-SLOWER = (  # bounds, for a drive that knows nothing of the dynamics
+LEAST_DURATIONS = (  # bounds, for a drive that knows nothing of the dynamics
     Axis(name="single_support_time_s.lower", values=(0.8, 1.2, 1.6, 2.0)),
     Axis(name="double_support_time_s.lower", values=(0.4, 0.8, 1.2)),
 )
@@ -53,7 +53,7 @@ SETTINGS = {
     "NAO, calm": Setting(),
     "NAO, bumps of 1 mm": Setting(conditions=Conditions(bumps=Bumps(height_m=0.001))),
     "NAO, mass +5 %": Setting(conditions=Conditions(mass_factor=1.05)),
-    "NAO, no feed-forward": Setting(drive=Drive(feed_forward="none"), limits=SLOWER),
+    "NAO, no feed-forward": Setting(drive=Drive(feed_forward="none"), limits=LEAST_DURATIONS),
     "JVRC-1 with balance, calm": Setting(**BALANCED),
     "JVRC-1 with balance, bumps of 5 mm": Setting(**BALANCED, conditions=Conditions(bumps=Bumps(height_m=0.005))),
 }

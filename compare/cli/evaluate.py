@@ -89,7 +89,7 @@ def _describe_gait(judged: JudgedGait) -> Iterator[str | Rows]:
     yield f"{gait.gait}: step {1000 * gait.step_m:.1f} mm, " + ", ".join(f"{name} {s:.4g} s" for name, s in durations)
     yield from judged.notes
     rows = [(name, f"{value:z.6f}", "-" if math.isnan(best) else f"{best:z.6f}") for name, value, best in judged.rows()]
-    yield Rows("Compared with the optimum at the same step and times", ("index", "this gait", "optimum"), rows)
+    yield Rows("Compared with the optimum at the same step and times", ("metric", "this gait", "optimum"), rows)
     yield from _describe_violations(judged.evaluation)
     if simulated is not None:
         fate = "stays up" if simulated.fell_at_s is None else f"FALLS at {simulated.fell_at_s:.2f} s"
@@ -129,7 +129,7 @@ def _list_cells(judged: Sequence[Evaluation]) -> Iterator[Sequence[object]]:
 def _describe(evaluation: Evaluation) -> Iterator[str | Rows]:
     objective, dense, guaranteed = evaluation.objective, evaluation.dense, evaluation.guaranteed
     yield f"{evaluation.problem}: {objective['name']} {with_unit(objective['value'], objective['unit'])}"
-    header = ["index", "value" if dense is None else "samples"]
+    header = ["metric", "value" if dense is None else "samples"]
     rows = [[name, f"{value:z.6f}"] for name, value in evaluation.metrics.items()]
     if dense is not None:
         header.append(f"{evaluation.dense_intervals} intervals")

@@ -53,10 +53,12 @@ def list_problems(
     if robot is not None:
         raise InputError("--robot takes a problem, or no name")
     algorithms = [describe_solver(one) for one in (names if name == ALGORITHMS else [name])]
-    parts = list(_describe_algorithm(algorithms[0]))
+    parts: list[str | Rows]
     if name == ALGORITHMS:
         titles = [(algorithm.name, algorithm.title) for algorithm in algorithms]
         parts = [Rows("Algorithms", ("name", "description"), titles), "settings and source: nlp-gait list NAME"]
+    else:
+        parts = list(_describe_algorithm(algorithms[0]))
     return Output(data={"algorithms": [asdict(algorithm) for algorithm in algorithms]}, parts=parts)
 
 

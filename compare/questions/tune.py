@@ -218,9 +218,10 @@ def _compare_energies(findings: Sequence[TunedGait]) -> Iterator[str]:
     if first.fell_at_s is not None:
         yield f"IPOPT's optimum of the model falls at {first.fell_at_s:.1f} s."
     else:
+        violations = "; ".join(first.list_violations())
         yield (
             f"IPOPT's optimum of the model needs {first.J_per_m:.2f} J/m in the engine, after one simulation"
-            f"{', but goes beyond what a gait may: ' if first.violation else ''}{', '.join(first.list_excesses())}."
+            f"{f', but violates limits: {violations}' if violations else ''}."
         )
     for solver in dict.fromkeys(row.solver for row in findings[1:]):
         rows = [row for row in findings if row.solver == solver]
@@ -231,6 +232,6 @@ def _compare_energies(findings: Sequence[TunedGait]) -> Iterator[str]:
             words += (
                 f"{np.median(standing) / first.J_per_m:.2f} times that energy{' (median)' if len(rows) > 1 else ''}; "
             )
-        beyond = sum(row.here.violation > 0.0 for row in rows if row.here.fell_at_s is None)
-        beyond_words = f", {beyond} of {len(rows)} go beyond what a gait may" if beyond else ""
-        yield f"{words}{len(rows) - len(standing)} of {len(rows)} fall{beyond_words}."
+        violating = sum(row.here.violation > 0.0 for row in rows if row.here.fell_at_s is None)
+        others = f", {violating} of {len(rows)} violate limits" if violating else ""
+        yield f"{words}{len(rows) - len(standing)} of {len(rows)} fall{others}."

@@ -351,7 +351,7 @@ def choose_finer_grid(problem: GaitProblem, x: Array, settings: WalkSettings) ->
 
 
 def _evaluate(problem: GaitProblem, x: Array, intervals: int) -> dict[str, float]:
-    """Return distance, duration and energy of a walk on a grid with at least so many intervals a phase."""
+    """Return distance, duration and energy of a walk on a grid with at least ``intervals`` intervals a phase."""
     fine = problem.dense(math.ceil(intervals / int(problem.options["intervals"]))) or problem
     metrics = build_exact_model(fine).at(x, fine.p).metrics
     return {name: float(metrics[name]) for name in ("distance_m", "duration_s", "energy_J")}

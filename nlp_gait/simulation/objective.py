@@ -14,12 +14,12 @@ from nlp_gait.simulation.measurements import Walk, measure_walk
 from nlp_gait.simulation.plan import Plan, make_plan
 from nlp_gait.simulation.simulate import Conditions, Simulation, SimulationRun, prepare
 
-# What a gait may do, the excess that counts as a whole violation, and how it is said, in a unit of so many per unit.
+# Limits of a gait: the largest value, the excess that counts as a whole violation, and a message with its factor.
 ALLOWED = {
-    "off": (0.05, 0.2, 100.0, "{:.1f} % off its way"),
-    "saturated": (0.02, 0.2, 100.0, "{:.1f} % of the time at a torque limit"),
-    "slip_m": (0.005, 0.05, 1000.0, "a foot slips by {:.1f} mm"),
-    "outside_rad": (0.02, 0.2, math.degrees(1.0), "{:.1f} degrees beyond the range of a joint"),
+    "off": (0.05, 0.2, "its end is {:.1f} % of the distance away from the planned one", 100.0),
+    "saturated": (0.02, 0.2, "a drive is at its torque limit for {:.1f} % of the time", 100.0),
+    "slip_m": (0.005, 0.05, "a foot slips by {:.1f} mm", 1000.0),
+    "outside_rad": (0.02, 0.2, "a joint is {:.1f} degrees beyond its range", math.degrees(1.0)),
 }
 MORE_STEPS = 4  # of the walk for whose ground the world is made
 
@@ -37,11 +37,12 @@ class GaitScore:
     slip_m: float
     outside_rad: float  #: largest angle beyond a joint's mechanical range
 
-    def list_excesses(self) -> list[str]:
-        """Return what it does beyond what it may, in words."""
-        done = {name: getattr(self, name) for name in ALLOWED}
+    def list_violations(self) -> list[str]:
+        """Return a message for each limit of ``ALLOWED`` that is violated."""
         return [
-            words.format(done[name] * scale) for name, (most, _, scale, words) in ALLOWED.items() if done[name] > most
+            message.format(factor * getattr(self, name))
+            for name, (most, _, message, factor) in ALLOWED.items()
+            if getattr(self, name) > most
         ]
 
 
@@ -64,7 +65,7 @@ class Arena:
     ) -> None:
         """Compile the world, whose ground has its bumps under a somewhat longer walk of a start point of the problem.
 
-        A cycle is simulated for so many steps, a whole walk with None; then the robot must stand for a while.
+        A cycle is simulated for ``steps`` steps, a whole walk with None; then the robot must stand for a while.
         """
         self.problem, self._drive, self._conditions = problem, drive or Drive(), conditions or Conditions()
         self._steps, self._settle_s = steps, settle_s

@@ -73,9 +73,8 @@ class LegMotion(NamedTuple):
     """Angles of a leg."""
 
     joints: Motion  #: (6,) [rad] with both derivatives
-    knee_cosine: (
-        SX  #: cosine of the knee's angle from straight, by the law of cosines; above 1 the foot is out of reach
-    )
+    #: Cosine of the knee's angle from straight, by the law of cosines; above 1 the foot is out of reach
+    knee_cosine: SX
     closure_error: SX  #: misfit of the torso's pose: the larger of distance and rotation times the leg's length [m]
 
 

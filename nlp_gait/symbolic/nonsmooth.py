@@ -41,7 +41,7 @@ class Root:
 
 
 class ImplicitVariables(NamedTuple):
-    """Equations of one instant that rows must tie, one below the other."""
+    """Unknowns of one instant, and the equations that determine them, one below the other."""
 
     unknowns: SX  #: (n,) symbols
     residual: SX  #: (n,) must be zero
@@ -166,8 +166,8 @@ class Lifted(Nonsmooth):
         return unknowns
 
     def collect_implicit_variables(self) -> ImplicitVariables | None:
-        roots, self._implicit = self._implicit, []
-        return ImplicitVariables(*(ca.vertcat(*columns) for columns in zip(*roots, strict=True))) if roots else None
+        found, self._implicit = self._implicit, []
+        return ImplicitVariables(*(ca.vertcat(*columns) for columns in zip(*found, strict=True))) if found else None
 
     def add_implicit_variables(self, start: MX, residual: Callable[[MX], MX]) -> MX:
         return self._lift("root", start, residual, tight=True)

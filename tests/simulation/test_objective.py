@@ -39,8 +39,9 @@ def test_a_score_is_the_energy_of_a_simulation(cycle: Result, arena: Arena) -> N
     assert score.off == pytest.approx(
         math.hypot(1.0 - walk.walked_m / walk.planned_m, (walk.drift_m or 0.0) / walk.planned_m)
     )
-    beyond = replace(score, off=0.116, slip_m=0.02).list_excesses()
-    assert not score.list_excesses() and beyond == ["11.6 % off its way", "a foot slips by 20.0 mm"]
+    off, slip = replace(score, off=0.116, slip_m=0.02).list_violations()
+    assert off == "its end is 11.6 % of the distance away from the planned one" and slip == "a foot slips by 20.0 mm"
+    assert not score.list_violations()
 
 
 def test_a_fall_is_worse_than_anything_else_and_worst_if_early(cycle: Result) -> None:

@@ -118,9 +118,8 @@ class Samples:
     )
     #: (2, N + 1) y of the left corners of a sole that may tilt [m]
     sides = Quantity(lambda _, now: now.sides, of_motion=True)
-    hip_rate = Quantity(
-        lambda _, now: now.hip_rate
-    )  #: (3, N + 1) velocity of the torso's origin [m/s], of recorded motions
+    #: (3, N + 1) velocity of the torso's origin [m/s], of recorded motions
+    hip_rate = Quantity(lambda _, now: now.hip_rate)
     #: (k, N + 1) angles of the arms that swing [rad]
     arm_angle = Quantity(lambda _, now: now.arm_angle, of_motion=True)
     #: (4, N + 1) attitude of the torso, a unit quaternion (w, x, y, z); empty where it is upright
@@ -156,6 +155,7 @@ class Samples:
         return self.wrench_left if side == "L" else self.wrench_right
 
 
+# Of every phase.
 USUAL = (
     Samples.planned,
     Samples.knee_cosine,
@@ -163,7 +163,7 @@ USUAL = (
     Samples.power,
     Samples.zmp,
     Samples.closure_error,
-)  # of every phase
+)
 
 
 class SampledMotion:
