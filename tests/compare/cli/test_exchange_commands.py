@@ -18,19 +18,8 @@ EXAMPLE = Path(__file__).parents[3] / "examples" / "bring_your_own.py"
 def test_bench_ranks_a_user_algorithm(tmp_path: Path) -> None:
     """By ``file.py:name``, without glue; called again it runs nothing and says the same."""
     out = tmp_path / "out"
-    call = (
-        "bench",
-        "--algorithm",
-        f"{EXAMPLE}:Shrinking",
-        "--instances",
-        ID,
-        "--runs",
-        "3",
-        "--jobs",
-        "1",
-        "--out",
-        out,
-    )
+    effort = f"--instances {ID} --runs 3 --jobs 1".split()
+    call = ("bench", "--algorithm", f"{EXAMPLE}:Shrinking", *effort, "--out", out)
     found = as_json(*call)
     assert 1 <= found["rank"] <= 13 and found["instances"] == [ID]
     assert {s["solver"] for s in found["standings"]} == {*BASELINE, found["solver"]}
