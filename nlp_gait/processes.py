@@ -45,7 +45,6 @@ class Job:
     is_late: Callable[[], bool] = never  #: whether to kill its process now, asked from its start
     #: In a process and session of its own, without input and output, that is killed at the end with all that it has started
     alone: bool = False
-    memory_bytes: int | None = None  #: if alone: most address space beyond that of this process (Linux only)
 
 
 @dataclass(kw_only=True)
@@ -131,7 +130,7 @@ def _start_worker(context: Any, jobs: Sequence[Job], job: Job) -> _Worker:
     calls = [item.call for item in jobs] if is_fork or not job.alone else {jobs.index(job): job.call}
     try:
         pipe, other = context.Pipe()
-        arguments = (other, calls, job.alone, job.memory_bytes, os.getpid())
+        arguments = (other, calls, job.alone, os.getpid())
         process = context.Process(target=_serve, args=arguments, daemon=True)
         with warnings.catch_warnings(), block_interrupts_in_children():
             # Python warns of forks of a process with threads. The locks that the work takes are free in the child.
@@ -144,13 +143,13 @@ def _start_worker(context: Any, jobs: Sequence[Job], job: Job) -> _Worker:
     return _Worker(process=process, pipe=pipe, job=job)
 
 
-def _serve(pipe: Connection, calls: Any, alone: bool, memory_bytes: int | None, parent: int) -> None:
+def _serve(pipe: Connection, calls: Any, alone: bool, parent: int) -> None:
     """Perform the calls whose numbers arrive, until the parent has ended."""
-    multiprocessing.current_process().daemon = False  # it may fork, too: a robot file is read in a child
+    multiprocessing.current_process().daemon = False  # it may fork, too: a solver runs alone
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     if alone:
-        _isolate(memory_bytes)
+        _isolate()
     with suppress(EOFError, OSError):
         while pipe.poll(PARENT_CHECKED_EVERY_S) or os.getppid() == parent:
             if not pipe.poll():
@@ -168,17 +167,10 @@ def _serve(pipe: Connection, calls: Any, alone: bool, memory_bytes: int | None, 
     os._exit(0)  # without the exit handlers of the parent
 
 
-def _isolate(memory_bytes: int | None) -> None:
-    """Give this process a session, null streams, and at most so much more address space."""
+def _isolate() -> None:
+    """Give this process a session and null streams."""
     if hasattr(os, "setsid"):
         os.setsid()
-    if memory_bytes is not None and sys.platform == "linux":
-        import resource
-
-        with open("/proc/self/statm", encoding="ascii") as file:
-            most = int(file.read().split()[0]) * mmap.PAGESIZE + memory_bytes
-        _, hard = resource.getrlimit(resource.RLIMIT_AS)
-        resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     nowhere = os.open(os.devnull, os.O_RDWR)
     for descriptor in (0, 1, 2):
@@ -191,10 +183,9 @@ def run_alone(
     call: Callable[[Callable[[Any], None]], T],
     is_late: Callable[[], bool] = never,
     receive: Callable[[Any], None] = lambda message: None,
-    memory_bytes: int | None = None,
 ) -> T:
     """Return what a call returns that runs alone, see ``Job``; raises as the call, WorkerError and TimeoutError."""
-    job = Job(call=call, is_late=is_late, receive=receive, alone=True, memory_bytes=memory_bytes)
+    job = Job(call=call, is_late=is_late, receive=receive, alone=True)
     ((_, result),) = run_jobs([job])
     if isinstance(result, BaseException):
         raise result

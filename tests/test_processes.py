@@ -166,13 +166,6 @@ def test_what_runs_alone_has_no_streams_its_own_session_and_no_survivors(capfd: 
     wait_for(lambda: not is_alive(child), 5.0)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are Linux's")
-def test_memory_of_what_runs_alone_is_limited() -> None:
-    with pytest.raises(MemoryError):
-        run_alone(lambda _: len(bytearray(2**30)), memory_bytes=2**28)
-    assert run_alone(lambda _: len(bytearray(2**20)), memory_bytes=2**28) == 2**20
-
-
 PARENT = """
 import os, sys, time
 from nlp_gait.interrupts import never

@@ -230,6 +230,7 @@ def infer_feet(
                 f"robot {robot!r}: a leg must have {LEG_JOINT_COUNT} turning joints from where both legs meet to the foot, "
                 f"{link!r} has {len(chain)}: {', '.join(placed.joint.child for placed in chain) or 'none'}"
             )
+        _check_lowest(robot, link, joints, read_shapes)
     _check_knees(robot, legs)
     soles = [
         _find_sole(robot, link, read_shapes, ankle - chain[0].place, float(np.linalg.norm(legs.hip_m - ankle)))
@@ -289,6 +290,18 @@ def _are_arms(legs: Legs, links: Links, chains: Mapping[str, Chain]) -> bool:
     heights = {name: chain[0].place[2] for name, chain in chains.items()}
     moment = sum(link.mass_kg * (heights.get(link.name, 0.0) + link.com_m[2]) for link in remaining)
     return bool(mass > 0.0 and legs.hip_m[2] > moment / mass)
+
+
+def _check_lowest(robot: str, foot: str, joints: Joints, read_shapes: ReadShapes) -> None:
+    """Raise RobotDataError if a link that turns against the foot reaches lower, as that behind a seventh joint of a leg does."""
+    lowest = read_shapes(foot).points[:, 2].min(initial=math.inf)
+    for joint in joints.values():
+        if joint.parent == foot and len(points := read_shapes(joint.child).points):
+            if joint.origin_m[2] + points[:, 2].min() < lowest - SOLE_THICKNESS_M:
+                raise RobotDataError(
+                    f"robot {robot!r}: {joint.child!r} reaches lower than {foot!r}, the sixth link of the leg, which carries it; "
+                    f"legs have {LEG_JOINT_COUNT} turning joints here: make fixed those that a gait does not need"
+                )
 
 
 def _find_sole(robot: str, link: str, read_shapes: ReadShapes, ankle_m: Array, leg_m: float) -> InferredSole:

@@ -22,11 +22,10 @@ from nlp_gait.robots.packages import MARK, MODEL_ENDINGS, find_kind, find_robot_
 from nlp_gait.robots.perturbation import perturb, split_name
 from nlp_gait.robots.robot import ANY_ANGLE, Foot, Joint, Link, Robot, check_robot_name, make_unit_axis
 from nlp_gait.robots.tree import check_inertias, move_along_axis, move_root, shift_to_com
-from nlp_gait.robots.welding import Joints, Links, RobotParts, find_faults, weld_faults
+from nlp_gait.robots.welding import Joints, Links, RobotParts, correct_tensors, find_faults, weld_faults
 
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
 NEGLIGIBLE_M = 1e-6  # published origins are rounded to this
-MOST_JOINTS = 400  # among which legs are searched, which takes 2 s then, and eight times as long for twice as many
 # Fields that replace those of the extended file.
 REPLACED = ("name", "description", "root", "forward", "heat_loss_W_per_Nm2", "inertia_about")
 
@@ -277,13 +276,12 @@ def _complete(
 ) -> Feet:
     """Return the feet of a robot from a URDF or MJCF; weld its faulty parts, and note what was inferred."""
     name = str(description.file.name)
-    if len(joints) > MOST_JOINTS:
-        raise ValueError(f"it has {len(joints)} turning joints, more than {MOST_JOINTS}; remove what no gait needs")
     for foot in feet.values():  # a sole's link is often behind a fixed joint
         if foot.get("link") not in links:
             foot["link"] = model.carriers.get(str(foot.get("link")), foot.get("link"))
     legs = find_legs(name, links, joints, feet)
     notes += model.notes
+    correct_tensors(links, notes)
     weld_faults(links, joints, legs.links, notes)
     check_sizes(name, links, joints, notes)
     _note_limits(joints, legs, notes)

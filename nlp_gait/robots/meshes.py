@@ -22,8 +22,6 @@ PACKAGES = ("package://", "model://")  # where a path begins with the name of a 
 POINTER = b"version https://git-lfs"  # first bytes of a file whose content Git LFS has not fetched
 FOLDER_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 STL_HEADER, STL_TRIANGLE = 84, 50  # bytes
-DEEPEST_NODE = 32  # of a Collada scene
-MOST_POINTS = 4_000_000
 RIM = 24  # points of a cylinder's edge
 
 
@@ -152,26 +150,18 @@ def _read_collada(data: bytes) -> Array:
     scale = float(unit.get("meter", "1")) if unit is not None else 1.0
     scene = root.find("library_visual_scenes/visual_scene")
     placed: list[Array] = []
-    total = 0
 
-    def visit(node: Any, pose: Array, level: int) -> None:
-        nonlocal total
-        if level > DEEPEST_NODE:
-            raise ValueError("its nodes are nested too deeply")
+    def visit(node: Any, pose: Array) -> None:
         for child in node:
             if child.tag in ("matrix", "translate", "rotate", "scale"):
                 pose = pose @ _transform(child)
             elif child.tag == "instance_geometry":
-                points = geometries[child.get("url")]
-                total += len(points)
-                if total > MOST_POINTS:
-                    raise ValueError(f"its instances have more than {MOST_POINTS} points; simplify it")
-                placed.append(move_points(points, pose))
+                placed.append(move_points(geometries[child.get("url")], pose))
             elif child.tag == "node":
-                visit(child, pose, level + 1)
+                visit(child, pose)
 
     if scene is not None:
-        visit(scene, np.eye(4), 0)
+        visit(scene, np.eye(4))
     # ``up_axis`` is ignored, as RViz, Gazebo classic, MoveIt and Pinocchio do.
     return np.asarray(scale * np.concatenate(placed or list(geometries.values())))
 

@@ -1,12 +1,9 @@
 """MJCF files as links and joints of a robot; MuJoCo itself reads them, with all files that they include."""
 
-import json
 import logging
 import math
 import re
-import time
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
@@ -15,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import MissingExtraError, RobotDataError, WorkerError
+from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import read_bytes
-from nlp_gait.processes import has_fork, run_alone
 from nlp_gait.robots.meshes import (
     POINTER,
     check_pointer,
@@ -29,8 +25,6 @@ from nlp_gait.robots.tree import Array, Mass, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
 LOG = logging.getLogger("nlp_gait")
-TIME_LIMIT_S, MEMORY_LIMIT_BYTES = 60.0, 4 * 2**30  # to compile a model
-LARGEST_RESULT = 256 * 2**20  # bytes
 JOINT_FREE, JOINT_HINGE, JOINT_TRANSMISSIONS = 0, 3, (0, 1)  # mjJNT_FREE, _HINGE; mjTRN_JOINT and mjTRN_JOINTINPARENT
 
 
@@ -158,77 +152,30 @@ def list_dependencies(path: str) -> list[str]:
 
 
 def _compile(path: str) -> Any:
-    """Return MuJoCo's model of a file, compiled in a child process."""
+    """Return MuJoCo's model of a file, and log its warnings."""
     if find_spec("mujoco") is None:
         raise MissingExtraError(
             f"robot file {path!r}: MJCF files need MuJoCo, which is not installed: pip install 'nlp-gait[sim]'"
         )
     read_bytes(Path(path), "robot file", error=RobotDataError)  # refuses special files
-    mujoco = import_module("mujoco")  # before the fork, which would import it in vain
-    texts, _, data = (_compile_in_child if has_fork() else _compile_binary)(mujoco, path).partition(b"\n")
-    warnings, files = json.loads(texts)
-    for text in warnings:
-        LOG.warning("robot file %r: %s", path, text)
-    try:
-        model = mujoco.MjModel.from_binary_path("robot.mjb", {"robot.mjb": data})
-        for name in ("body_pos", "body_ipos", "body_mass", "body_inertia", "jnt_pos", "jnt_range", "qpos0"):
-            if not are_plausible(getattr(model, name)):
-                raise ValueError(f"{name} must hold finite numbers within {LARGEST_NUMBER:g}")
-        return model
-    except Exception as error:
-        raise _convert(path, error) from error
-
-
-def _compile_in_child(mujoco: Any, path: str) -> bytes:
-    """Call ``_compile_binary`` in a forked process with limits of time and memory; Ctrl-C ends it at once."""
-    memory = f"more than {MEMORY_LIMIT_BYTES // 2**30} GiB of memory"
-
-    def call(_: Callable[[object], None]) -> bytes:
-        with suppress(MemoryError):
-            content = _compile_binary(mujoco, path)
-            if len(content) <= LARGEST_RESULT:
-                return content
-        raise RobotDataError(f"robot file {path!r} probably needs {memory} to be read; simplify the file")
-
-    latest = time.monotonic() + TIME_LIMIT_S
-    try:
-        return run_alone(call, lambda: time.monotonic() > latest, memory_bytes=MEMORY_LIMIT_BYTES)
-    except TimeoutError:
-        raise RobotDataError(f"robot file {path!r} was not read within {TIME_LIMIT_S:g} s; simplify the file") from None
-    except WorkerError as error:
-        raise RobotDataError(
-            f"robot file {path!r} cannot be read: {error}; it may need {memory}; simplify the file"
-        ) from error
-
-
-def _compile_binary(mujoco: Any, path: str) -> bytes:
-    """Return MuJoCo's warnings and the files read as a line of JSON, and the model in binary form; for a child process."""
-    warnings: list[str] = []
-    earlier = mujoco.get_mju_user_warning()  # restored where this is no child process
-    mujoco.set_mju_user_warning(warnings.append)
+    mujoco = import_module("mujoco")
+    earlier = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(partial(LOG.warning, "robot file %r: %s", path))
     try:
         model = mujoco.MjModel.from_xml_path(path)
-        files = [str(file) for file in mujoco.mju_getXMLDependencies(path)]
-        data = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-        mujoco.mj_saveModel(model, None, data)
-    except MemoryError:
-        raise
     except Exception as error:  # ValueError, and any error of a plugin or decoder
-        if "unknown exception" in str(error):  # of C++: no memory
-            raise MemoryError from error
         for name in re.findall(r"'([^'*?\[]+)'", str(error)):
             for file in filter(Path.is_file, Path(path).parent.rglob(Path(name).name)):
                 check_pointer(file, file.open("rb").read(len(POINTER)))
-        raise _convert(path, error) from error
+        reason = " ".join(str(error).split())[:300] or type(error).__name__
+        remedy = next((text for mark, text in REMEDIES.items() if mark in reason), "")
+        raise RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}{remedy}") from error
     finally:
         mujoco.set_mju_user_warning(earlier)
-    return json.dumps([warnings, files]).encode() + b"\n" + data.tobytes()
-
-
-def _convert(path: str, error: Exception) -> RobotDataError:
-    reason = " ".join(str(error).split())[:300] or type(error).__name__
-    remedy = next((text for mark, text in REMEDIES.items() if mark in reason), "")
-    return RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}{remedy}")
+    for name in ("body_pos", "body_ipos", "body_mass", "body_inertia", "jnt_pos", "jnt_range", "qpos0"):
+        if not are_plausible(getattr(model, name)):
+            raise RobotDataError(f"robot file {path!r}: {name} must hold finite numbers within {LARGEST_NUMBER:g}")
+    return model
 
 
 def _find_root(model: Any, notes: list[str]) -> int:

@@ -72,13 +72,18 @@ class Link:
         owner = f"link {self.name!r}"
         check_numbers(owner, self, positive=("mass_kg",))
         low, middle, high = np.linalg.eigvalsh(self.inertia_matrix)
-        slack = max(TRIANGLE_TOLERANCE * high, NEGLIGIBLE_KGM2)
-        if low < -slack or low + middle < high - slack:
+        if low < -max(TRIANGLE_TOLERANCE * high, NEGLIGIBLE_KGM2) or self.is_unbalanced:
             raise RobotDataError(
                 f"{owner}: inertia_com_kgm2 has principal moments {low:.3e}, {middle:.3e}, {high:.3e} kg m^2; a rigid body "
                 "needs all >= 0 and none above the sum of the other two. Tensors about any point satisfy that: is a number "
                 "mistyped, or was the tensor shifted to the centre of mass twice?"
             )
+
+    @property
+    def is_unbalanced(self) -> bool:
+        """Whether a principal moment is above the sum of the other two, which no rigid body has."""
+        low, middle, high = np.linalg.eigvalsh(self.inertia_matrix)
+        return bool(low + middle < high - max(TRIANGLE_TOLERANCE * high, NEGLIGIBLE_KGM2))
 
     @property
     def inertia_matrix(self) -> np.ndarray:

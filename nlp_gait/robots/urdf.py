@@ -51,7 +51,6 @@ SHAPES = ("collision", "visual")
 WORLD = "world"
 # Ends of the names of elements of xacro that change others.
 XACRO = ("}arg", "}if", "}include", "}macro", "}property", "}unless")
-MOST_PARTS = 2000  # links and joints; the time to read them grows with the square
 
 
 def read_urdf(path: str, *, about_joint: bool = False) -> RobotParts:
@@ -176,9 +175,6 @@ def _read_xml(path: str) -> Any:
         raise ValueError("it is a xacro file; expand it first: xacro FILE > ROBOT.urdf")
     if robot.tag != "robot":
         raise ValueError(f"it is not a URDF of a robot: it begins with <{robot.tag}>, not <robot>")
-    elements = robot.findall("link") + robot.findall("joint")
-    if len(elements) > MOST_PARTS:
-        raise ValueError(f"it has {len(elements)} links and joints, more than {MOST_PARTS}; simplify the file")
     return robot
 
 

@@ -4,6 +4,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.robot import Joint, Link
 from nlp_gait.robots.tree import Array, Mass, combine_masses, to_vector, weld_child
@@ -77,6 +79,22 @@ def join_frames(
         joints[joint.name] = replace(joint, parent=parent, origin_m=origin)
     root = next(link for link, frame in frames.items() if frame.parent is None)
     return RobotParts(name, root, links, joints, carriers, read_shapes, tuple(notes), unusable)
+
+
+def correct_tensors(links: Links, notes: list[str]) -> None:
+    """Give tensors with one moment above the sum of the others three equal moments, as MuJoCo's ``balanceinertia`` does."""
+    balanced = []
+    for name, link in links.items():
+        moments = np.linalg.eigvalsh(link.inertia_matrix)
+        if moments[0] >= 0.0 and link.is_unbalanced:
+            balanced.append(f"{name} ({', '.join(f'{moment:.2g}' for moment in moments)} kg m^2)")
+            mean = float(moments.mean())
+            links[name] = replace(link, inertia_com_kgm2=(mean, mean, mean, 0.0, 0.0, 0.0))
+    if balanced:
+        notes.append(
+            "no rigid body has these principal moments; each has their mean, as with MuJoCo's balanceinertia: "
+            f"{'; '.join(balanced)}"
+        )
 
 
 def weld_faults(links: Links, joints: Joints, legs: Collection[str], notes: list[str]) -> None:

@@ -63,12 +63,12 @@ def crooked_urdf(*, sole: bool = True) -> str:
         arm = f"{prefix}_arm"
         parts.append(link(arm, ARM_KG, (0.0, 0.0, -0.15), 0.15))
         parts.append(joint(f"{prefix}_shoulder", "base", arm, (0.0, sign * 0.2, 0.3), (0.0, 1.0, 0.0), (0.2, 2.0)))
-        # What real files have: a finger without mass, and a hand whose tensor no body has.
+        # What real files have: a finger without mass, and a hand with a negative moment.
         parts.append(f'<link name="{prefix}_finger"/>')
         parts.append(joint(f"{prefix}_grip", arm, f"{prefix}_finger", (0.0, 0.0, -0.3), (0.0, 1.0, 0.0), (-1.0, 1.0)))
         parts.append(
             f'<link name="{prefix}_hand"><inertial><mass value="0.1"/>'
-            '<inertia ixx="1e-6" iyy="1e-6" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            '<inertia ixx="-1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial></link>'
         )
         parts.append(joint(f"{prefix}_wrist", arm, f"{prefix}_hand", (0.0, 0.0, -0.3), (0.0, 1.0, 0.0), (-1.0, 1.0)))
     return f'<?xml version="1.0"?>\n<robot name="crooked">{"".join(parts)}</robot>\n'

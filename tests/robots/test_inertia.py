@@ -1,6 +1,7 @@
 """Inertia tensors about the wrong point are found and explained, and those of the real robots pass."""
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,24 @@ def test_a_statement_that_they_are_right_is_accepted_for_the_links_of_its_own_fi
         np.testing.assert_allclose(mixed.links[name].inertia_matrix, link.inertia_matrix, rtol=0, atol=TOLERANCE)
     with pytest.raises(RobotDataError, match="inertia_about must be 'com' or 'joint', got 'origin'"):
         load_robot(written(tmp_path, nao() | {"inertia_about": "origin"}))
+
+
+def test_tensors_that_no_body_has_are_balanced_as_by_mujoco(tmp_path: Path) -> None:
+    """One of a shank in its own axes; the file says nothing of it, and MuJoCo's model of the file does."""
+    mujoco = pytest.importorskip("mujoco")
+    shank = (
+        '<link name="A_knee_link"><inertial><origin xyz="0 0 -0.08" rpy="0.3 -0.2 0.1"/><mass value="0.8"/><inertia '
+    )
+    moments = 'ixx="0.001" iyy="0.002" izz="0.006" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    text = re.sub(r'<link name="A_knee_link">.*?</link>', shank + moments, crooked_urdf())
+    robot = load_robot(crooked(tmp_path, text))
+    assert any("A_knee_link (0.001, 0.002, 0.006 kg m^2)" in note for note in robot.notes)
+    compiler = '<mujoco><compiler balanceinertia="true" boundmass="1e-6" boundinertia="1e-9"/></mujoco>'
+    file = text.replace('"-1e-3"', '"1e-3"').replace('name="crooked">', f'name="crooked">{compiler}')
+    model = mujoco.MjModel.from_xml_string(file)
+    np.testing.assert_allclose(np.diag(model.body("A_knee_link").inertia), robot.links["A_knee_link"].inertia_matrix)
+    with pytest.raises(ValueError, match="balanceinertia"):
+        mujoco.MjModel.from_xml_string(file.replace('balanceinertia="true" ', ""))
 
 
 def test_few_links_or_links_near_their_joints_prove_nothing() -> None:

@@ -15,7 +15,17 @@ from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.robots.leg import make_leg
 from nlp_gait.robots.meshes import find_mesh
 from nlp_gait.robots.tree import find_partner, find_partners
-from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
+from tests.robots.crooked import (
+    ANKLE_M,
+    ARM_KG,
+    LEG,
+    MASSES,
+    SOLE_AHEAD_M,
+    SOLE_M,
+    TORSO_KG,
+    crooked,
+    crooked_urdf,
+)
 
 HAND_KG = 0.1
 
