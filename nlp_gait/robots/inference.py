@@ -325,8 +325,8 @@ def _find_sole(robot: str, link: str, read_shapes: ReadShapes, ankle_m: Array, l
     if min(high[:2] - low[:2]) < LEAST_WIDTH_M:
         raise RobotDataError(
             f"robot {robot!r}: the lowest part of {link!r} at zero angles is {1e3 * (high[0] - low[0]):.1f} mm by "
-            f"{1e3 * (high[1] - low[1]):.1f} mm: no flat sole. Soles that are tilted at zero angles are not supported; "
-            f"else {write}"
+            f"{1e3 * (high[1] - low[1]):.1f} mm: no flat sole. If it is tilted at zero angles, turn an origin of "
+            f"the ankle (rpy) until it is level, which moves the zero of that joint; else {write}"
         )
     if max(high[:2] - low[:2]) > leg_m:
         raise RobotDataError(

@@ -167,7 +167,7 @@ INCOMPLETE = [
     ),
     (
         change('size="0.17 0.09 0.02"', 'size="0.17 0.001 0.02"'),
-        r"no flat sole. Soles .* tilted .*; else write its sole",
+        r"no flat sole. If it is tilted .* turn an origin .*; else write its sole",
     ),
     (
         change('lower="-0.1" upper="2.3"', 'lower="-2.3" upper="0.1"'),
