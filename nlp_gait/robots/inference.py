@@ -29,9 +29,10 @@ FORWARD_ANGLES = {"x": 0.0, "y": -math.pi / 2, "-x": math.pi, "-y": math.pi / 2}
 SOLE_THICKNESS_M = 0.004  # points of a foot this close to its lowest one are on the ground
 CLEARLY_LOWER_M = 0.1  # the joints of the feet are lower than those of any other mirrored pair by this
 CLEAR_LEAD_M = 0.03  # soles whose parts in front of and behind the ankle differ by this show the forward direction
+CLEAR_LEAD = 1 / 3  # of their length, by which they contradict the knees
 NEGLIGIBLE_INERTIA = 0.01  # of a link, as a share of that of the robot's mass at its size
 NEGLIGIBLE_MASS = 0.005  # of a link, as a share of the robot's
-DENSEST = 22590.0  # of solids, osmium [kg/m^3]
+DENSEST, WATER = 22590.0, 1000.0  # of solids, osmium; above that of any robot in a cube of its size [kg/m^3]
 PAIRED_M, PAIRED_COSINE = 1e-2, 0.99  # axes of a pair of joints are images of each other to this
 LEAST_JOINTS = 3  # of limbs that may be legs
 LEAST_WIDTH_M = 0.01  # a narrower sole is a line or a point
@@ -178,15 +179,25 @@ def _find_nearest(placed: PlacedJoint, other: PlacedJoint | None = None) -> Arra
 
 
 def check_sizes(robot: str, links: Links, joints: Joints, notes: list[str]) -> None:
-    """Note links more concentrated than any matter; raise RobotDataError for one spread further than root and joints.
+    """Note links more concentrated than any matter; raise RobotDataError for one too heavy or spread too far for root and joints.
 
     Of all bodies of a mass and a largest density, a ball has the least trace of the tensor, 6/5 m r^2. Light links do not matter.
     """
     places = [np.zeros(3), *(chain[0].place for chain in _find_chains(joints).values())]
     size = float(np.linalg.norm(np.ptp(places, axis=0)))
     mass_kg = sum(link.mass_kg for link in links.values())
+    heaviest = max(links.values(), key=lambda link: link.mass_kg)
+    if mass_kg > WATER * size**3:
+        raise RobotDataError(
+            f"robot {robot!r}: {heaviest.name!r} has {heaviest.mass_kg:.3g} kg, root and joints span {size:.3g} m; masses are in "
+            "kg: is it in g, or of another scale?"
+        )
     for name, link in links.items():
-        radius = math.sqrt(max(float(np.trace(link.inertia_matrix)), 0.0) / (2 * link.mass_kg))
+        radius = (
+            math.sqrt(max(float(np.trace(link.inertia_matrix)), 0.0) / (2 * link.mass_kg))
+            if link.mass_kg > 0.0
+            else 0.0
+        )
         if radius <= size:
             continue
         fault = (
@@ -352,7 +363,8 @@ def _find_forward(robot: str, legs: Legs, soles: list[InferredSole], notes: list
     axis = 0 if abs(between[1]) >= abs(between[0]) else 1  # forward is along it
     knee = sum(direction[axis] for direction in _find_knee_directions(legs))
     lead = sum(sole.high[axis] + sole.low[axis] for sole in soles) / 2
-    if abs(lead) < CLEAR_LEAD_M:
+    length = sum(sole.high[axis] - sole.low[axis] for sole in soles) / 2
+    if abs(lead) < (CLEAR_LEAD * length if knee else CLEAR_LEAD_M):
         lead = 0.0
     if not (lead or knee):
         notes.append(f"neither knees nor soles show the forward direction: it is taken along {'xy'[axis]}")

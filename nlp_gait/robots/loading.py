@@ -279,11 +279,11 @@ def _complete(
     for foot in feet.values():  # a sole's link is often behind a fixed joint
         if foot.get("link") not in links:
             foot["link"] = model.carriers.get(str(foot.get("link")), foot.get("link"))
+    check_sizes(name, links, joints, notes)
     legs = find_legs(name, links, joints, feet)
     notes += model.notes
     correct_tensors(links, notes)
     weld_faults(links, joints, legs.links, notes)
-    check_sizes(name, links, joints, notes)
     _note_limits(joints, legs, notes)
     if all(legs.chains):
         _move_frames(str(description.file.root), legs, links, joints, notes)

@@ -31,6 +31,7 @@ JOINT_FREE, JOINT_HINGE, JOINT_TRANSMISSIONS = 0, 3, (0, 1)  # mjJNT_FREE, _HING
 # By a part of MuJoCo's message.
 REMEDIES = {
     "opening file": "; meshes must be where the file names them (its meshdir)",
+    "not found": "; is it in a file that includes this one, such as a scene? Then give that one",
     "unrecognized attribute": "; this version of MuJoCo has no such attribute: remove it",
 }
 

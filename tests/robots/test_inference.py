@@ -170,7 +170,9 @@ INCOMPLETE = [
         r"no flat sole. If it is tilted .* turn an origin .*; else write its sole",
     ),
     (
-        change('lower="-0.1" upper="2.3"', 'lower="-2.3" upper="0.1"'),
+        lambda text: change(f'xyz="{SOLE_AHEAD_M} ', 'xyz="0.04 ')(text).replace(
+            'lower="-0.1" upper="2.3"', 'lower="-2.3" upper="0.1"'
+        ),
         r"knees .* contradict each other; write the forward direction",
     ),
     (
@@ -183,6 +185,10 @@ INCOMPLETE = [
     (
         change('<origin xyz="0.0 0.0 0.15"/>', '<origin xyz="0.0 0.0 -0.9"/>'),
         r"no feet found: .*'A_ankle_roll_link' and 'B_ankle_roll_link', belongs to arms: they begin above",
+    ),
+    (
+        change('<mass value="1.1"/>', '<mass value="1100"/>'),
+        r"'A_knee_link' has 1\.1e\+03 kg, root and joints span .* is it in g",
     ),
     (
         change('<mass value="1.1"/>', '<mass value="0"/>'),
