@@ -100,7 +100,7 @@ def find_legs(robot: str, links: Links, joints: Joints, feet: Feet) -> Legs:
         if count != len(legs.chains[1]) or count < LEAST_JOINTS:
             continue
         heights = [float(ankle[2]) for ankle in legs.ankles_m]
-        fault, are_arms = _find_mirror_fault(legs), _are_arms(legs, links, chains)
+        fault, are_arms = _find_direction_fault(legs) or _find_mirror_fault(legs), _are_arms(legs, links, chains)
         if are_arms and not fault:
             fault = "belongs to arms: they begin above the other links' centre of mass"
         elif count != LEG_JOINT_COUNT and not fault:
@@ -117,7 +117,7 @@ def find_legs(robot: str, links: Links, joints: Joints, feet: Feet) -> Legs:
         hint = "no two links have the same number of turning joints below where they meet; "
         if failed:
             _, fault, pair = min(failed)
-            hint = f"the lowest pair, {pair[0]!r} and {pair[1]!r}, {fault}; if other links are the feet, "
+            hint = f"the lowest pair, {pair[0]!r} and {pair[1]!r}, {fault}; if these or other links are the feet, "
         raise RobotDataError(
             f"robot {robot!r}: no feet found: two links, mirror images of each other (z is up), with {LEG_JOINT_COUNT} turning "
             f"joints each below the link where both legs meet; {hint}{remedy}"
@@ -142,6 +142,18 @@ def find_middle(legs: Legs) -> Array:
     ]
     middle[across] = np.median(places) if places else 0.0
     return middle
+
+
+def _find_direction_fault(legs: Legs) -> str:
+    """Return whereto the legs point if that is not down, in words; "" if it is."""
+    leg = legs.ankles_m[0] - legs.hip_m
+    axis = int(np.argmax(np.abs(leg)))
+    if axis == 2 and leg[2] < 0.0:
+        return ""
+    return (
+        f"points along {'-' if leg[axis] < 0.0 else ''}{'xyz'[axis]} at zero angles, and z must be up: turn the root, as by the "
+        "rpy of a fixed joint above it"
+    )
 
 
 def _find_mirror_fault(legs: Legs) -> str:

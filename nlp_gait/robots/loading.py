@@ -235,9 +235,9 @@ def _read(name_or_path: str) -> RobotFile:
         raise unknown("robot", name_or_path, list_robots())
     path = Path(name_or_path if name_or_path.endswith(".json") else str(_DATA / f"{name_or_path}.json"))
     file = read_dataclass(RobotFile, path, "robot file", error=RobotDataError)
-    models = [model for ending in MODEL_ENDINGS if os.path.isfile(model := path.with_suffix(ending))]
-    if file.extends is None and file.root is None and models:
-        return replace(file, extends=models[0].name)
+    if file.extends is None and file.root is None:
+        models = [other for other in sorted(path.parent.glob("*")) if other.stem == path.stem and _is_model(other.name)]
+        return replace(file, extends=models[0].name) if models else file
     return file
 
 

@@ -25,6 +25,7 @@ from nlp_gait.robots.tree import Array, Mass, to_vector
 from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
 LOG = logging.getLogger("nlp_gait")
+LIGHT_KG = 1e-5  # mass of a link between two hinges of a body
 JOINT_FREE, JOINT_HINGE, JOINT_TRANSMISSIONS = 0, 3, (0, 1)  # mjJNT_FREE, _HINGE; mjTRN_JOINT and mjTRN_JOINTINPARENT
 
 
@@ -40,8 +41,9 @@ def read_mjcf(path: str) -> RobotParts:
     """Read the links and joints of an MJCF file.
 
     The robot is the heaviest tree of bodies in the world. All frames get its root's axes at the reference pose, where all angles
-    count as zero. Bodies that do not turn against each other become one. Raises MissingExtraError without MuJoCo, RobotDataError
-    if that cannot read the file, or ValueError if it contains no robot, or a body with several hinges.
+    count as zero. Bodies that do not turn against each other become one; a body with several hinges has a light link between
+    two of them. Raises MissingExtraError without MuJoCo, RobotDataError if that cannot read the file, or ValueError if it
+    contains no robot.
     """
     model = _compile(path)
     notes: list[str] = []
@@ -52,15 +54,17 @@ def read_mjcf(path: str) -> RobotParts:
         raise ValueError("two bodies have the same name")
     frames, turning, hinges = {}, [], dict[str, int]()
     for i, name in names.items():
-        hinge = None if i == root else _find_hinge(model, i)
         parent = None if i == root else names[int(model.body_parentid[i])]
         mass = Mass(float(model.body_mass[i]), np.zeros(3), np.diag(model.body_inertia[i]))
         mass = mass.turn(data.ximat[i].reshape(3, 3)).move(data.xipos[i])
-        origin = data.xpos[i] if hinge is None else data.xanchor[hinge]
-        frames[name] = LinkFrame(parent, hinge is not None, origin, mass)
-        if hinge is not None:
-            turning.append(_read_turning(model, hinge, str(parent), name, data.xaxis[hinge]))
-            hinges[name] = hinge
+        frames[name] = LinkFrame(parent, False, data.xpos[i], mass)
+        listed = [] if i == root else _list_hinges(model, i)
+        for hinge in listed:
+            child = name if hinge == listed[-1] else f"{name} behind {model.joint(hinge).name}"
+            carried = mass if hinge == listed[-1] else Mass(LIGHT_KG, data.xanchor[hinge], np.zeros((3, 3)))
+            frames[child] = LinkFrame(parent, True, data.xanchor[hinge], carried)
+            turning.append(_read_turning(model, hinge, str(parent), child, data.xaxis[hinge]))
+            hinges[child], parent = hinge, child
     carriers = list_carriers(frames)
     unusable = {
         body: "has no actuator: it is not driven, and closed chains are not supported; add its motor"
@@ -209,14 +213,10 @@ def _place_bodies(model: Any, root: int) -> Any:
     return data
 
 
-def _find_hinge(model: Any, body: int) -> int | None:
-    """Return the hinge that carries a body, None without one; raises ValueError for several."""
+def _list_hinges(model: Any, body: int) -> list[int]:
+    """Return the hinges that carry a body, the nearest to its parent first."""
     first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-    hinges = [j for j in range(first, first + count) if model.jnt_type[j] == JOINT_HINGE]
-    if len(hinges) > 1:
-        name = model.body(body).name
-        raise ValueError(f"body {name!r} has {len(hinges)} hinges; give each its own body with a small mass")
-    return hinges[0] if hinges else None
+    return [j for j in range(first, first + count) if model.jnt_type[j] == JOINT_HINGE]
 
 
 def _find_torque_limit(model: Any, joint: int) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.robot import Joint, Link
-from nlp_gait.robots.tree import Array, Mass, combine_masses, to_vector, weld_child
+from nlp_gait.robots.tree import Array, Mass, combine_masses, list_moments, to_vector, weld_child
 
 
 class FootShapes(NamedTuple):
@@ -22,6 +22,7 @@ class FootShapes(NamedTuple):
 
 Links = dict[str, Link]
 Joints = dict[str, Joint]
+SLIGHT_M = 1e-3  # radius of gyration of negative moments that rounding explains
 ReadShapes = Callable[[str], FootShapes]  # shapes that move with a link
 
 
@@ -82,18 +83,22 @@ def join_frames(
 
 
 def correct_tensors(links: Links, notes: list[str]) -> None:
-    """Give tensors with one moment above the sum of the others three equal moments, as MuJoCo's ``balanceinertia`` does."""
-    balanced = []
-    for name, link in links.items():
-        moments = np.linalg.eigvalsh(link.inertia_matrix)
-        if moments[0] >= 0.0 and link.is_unbalanced:
-            balanced.append(f"{name} ({', '.join(f'{moment:.2g}' for moment in moments)} kg m^2)")
-            mean = float(moments.mean())
-            links[name] = replace(link, inertia_com_kgm2=(mean, mean, mean, 0.0, 0.0, 0.0))
-    if balanced:
+    """Make slightly negative principal moments zero; where one is above the sum of the others, give all three their mean."""
+    corrected = []
+    for name in find_faults(links):
+        link = links[name]
+        moments, axes = np.linalg.eigh(link.inertia_matrix)
+        if moments[0] < -link.mass_kg * SLIGHT_M**2 or link.mass_kg <= 0.0:
+            continue
+        corrected.append(f"{name} ({', '.join(f'{moment:.2g}' for moment in moments)} kg m^2)")
+        positive = np.maximum(moments, 0.0)
+        links[name] = replace(link, inertia_com_kgm2=list_moments(axes * positive @ axes.T))
+        if links[name].is_unbalanced:
+            links[name] = replace(link, inertia_com_kgm2=list_moments(positive.mean() * np.eye(3)))
+    if corrected:
         notes.append(
-            "no rigid body has these principal moments; each has their mean, as with MuJoCo's balanceinertia: "
-            f"{'; '.join(balanced)}"
+            "no rigid body has these principal moments; negative ones are zero, and if one is above the sum of the others, each "
+            f"is their mean, as with MuJoCo's balanceinertia: {'; '.join(corrected)}"
         )
 
 

@@ -24,7 +24,7 @@ TIME_STEP = 0.0005  # [s]
 FRICTION = 0.7  # rubber-like soles on a hard floor
 TURNING_FRICTION, ROLLING_FRICTION = 0.005, 0.0001  # MuJoCo's defaults; with condim 3 neither acts
 LEAST_MOMENT = 1e-12  # of inertia that MuJoCo accepts [kg m^2]
-BALL_RADIUS = 1e-3  # [m]
+BALL_RADIUS, ROUNDING = 1e-3, 1e-9  # [m]; of the sum of two principal moments, as a share of the third
 LAST_TREAD, STAIR_HALF_WIDTH = 2.0, 0.25  # [m]
 
 LEFT, RIGHT, TRUNK = "0.00 0.45 0.70 1", "0.84 0.37 0.00 1", "0.80 0.81 0.84 1"  # blue and orange of Okabe and Ito
@@ -177,10 +177,12 @@ def add_bodies(
 
 
 def _make_positive_tensor(link: Link) -> tuple[float, ...]:
-    """Return the tensor xx, yy, zz, xy, xz, yz [kg m^2]; points and thin rods, which MuJoCo refuses, get a small ball's."""
+    """Return the tensor xx, yy, zz, xy, xz, yz [kg m^2]; points, rods and plates, which MuJoCo refuses, get a small ball's."""
     moments, products = link.inertia_com_kgm2[:3], link.inertia_com_kgm2[3:]
-    thin = np.linalg.eigvalsh(link.inertia_matrix)[0] < LEAST_MOMENT
-    ball = 0.4 * link.mass_kg * BALL_RADIUS**2 if thin else 0.0
+    low, middle, high = np.linalg.eigvalsh(link.inertia_matrix)
+    excess, ball = high - low - middle, 0.0
+    if low < LEAST_MOMENT or excess > -ROUNDING * high:
+        ball = max(0.4 * link.mass_kg * BALL_RADIUS**2, 2.0 * excess)
     return (*(moment + ball for moment in moments), *products)
 
 

@@ -86,6 +86,14 @@ def test_tensors_that_no_body_has_are_balanced_as_by_mujoco(tmp_path: Path) -> N
         mujoco.MjModel.from_xml_string(file.replace('balanceinertia="true" ', ""))
 
 
+def test_slightly_negative_moments_are_zero(tmp_path: Path) -> None:
+    text = crooked_urdf().replace(
+        '<inertia ixx="-1e-3" iyy="1e-3" izz="1e-3"', '<inertia ixx="-5e-8" iyy="1e-3" izz="1e-3"'
+    )
+    hand = load_robot(crooked(tmp_path, text)).links["A_hand"]
+    assert six(hand.inertia_matrix) == pytest.approx([0.0, 1e-3, 1e-3, 0.0, 0.0, 0.0])
+
+
 def test_few_links_or_links_near_their_joints_prove_nothing() -> None:
     far = Link(name="far", mass_kg=1.0, com_m=(0.09, 0.0, 0.0), inertia_com_kgm2=BALL.inertia_com_kgm2)  # ratio 0.81
     near = Link(name="near", mass_kg=1.0, com_m=(0.05, 0.0, 0.0), inertia_com_kgm2=BALL.inertia_com_kgm2)  # 0.25

@@ -187,6 +187,14 @@ INCOMPLETE = [
         r"no feet found: .*'A_ankle_roll_link' and 'B_ankle_roll_link', belongs to arms: they begin above",
     ),
     (
+        change(
+            "</robot>",
+            '<link name="low"/><joint name="lie" type="fixed"><origin rpy="1.5707963 0 0"/><parent link="low"/>'
+            '<child link="base"/></joint></robot>',
+        ),
+        r"no feet found: .* points along y at zero angles, and z must be up: turn the root",
+    ),
+    (
         change('<mass value="1.1"/>', '<mass value="1100"/>'),
         r"'A_knee_link' has 1\.1e\+03 kg, root and joints span .* is it in g",
     ),

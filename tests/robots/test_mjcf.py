@@ -9,7 +9,7 @@ import mujoco
 import pytest
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
-from nlp_gait.robots import load_robot
+from nlp_gait.robots import load_robot, mjcf
 from nlp_gait.robots.biped import make_biped_model
 from tests.robots.crooked import crooked, crooked_urdf
 from tests.robots.custom import assert_same
@@ -62,7 +62,11 @@ def test_mujocos_translation_of_a_urdf_is_the_same_robot(path: str) -> None:
             '<asset><mesh file="no.stl"/></asset><worldbody>',
             "no.stl'; meshes must be where the file names",
         ),
-        ('<joint name="A_knee"', '<joint name="extra"/><joint name="A_knee"', "has 2 hinges; give each its own body"),
+        (
+            "<worldbody>",
+            '<contact><pair geom1="a" geom2="b"/></contact><worldbody>',
+            "includes this one, such as a scene",
+        ),
     ],
 )
 def test_what_is_wrong_with_an_mjcf_is_reported(path: str, tmp_path: Path, old: str, new: str, message: str) -> None:
@@ -71,6 +75,26 @@ def test_what_is_wrong_with_an_mjcf_is_reported(path: str, tmp_path: Path, old: 
     (tmp_path / "robot.xml").write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(RobotDataError, match=message):
         load_robot(str(tmp_path / "robot.xml"))
+
+
+def test_a_body_with_two_hinges_is_two_bodies(path: str, tmp_path: Path) -> None:
+    text = Path(path).read_text(encoding="utf-8")
+    twist = '<joint name="twist" axis="0 0 1" range="-1 1"/>'
+    mass = f'<inertial pos="0 0 0" mass="{mjcf.LIGHT_KG}" diaginertia="1e-12 1e-12 1e-12"/>'
+    begin = text.index('<body name="A_arm"')
+    place, end = text.index(">", begin) + 1, text.index("</body>", begin)
+    pos = text[begin:place].removeprefix('<body name="A_arm"')
+    variants = {
+        "one": text.replace('<joint name="A_shoulder"', f'{twist}<joint name="A_shoulder"'),
+        "two": f'{text[:begin]}<body name="x"{pos}{mass}{twist}<body name="A_arm">{text[place:end]}</body>{text[end:]}',
+    }
+    for name, variant in variants.items():
+        (tmp_path / f"{name}.xml").write_text(variant, encoding="utf-8")
+    found, wanted = (load_robot(str(tmp_path / f"{name}.xml")) for name in variants)
+    assert [joint.name for joint in found.path_to_root("A_arm")] == ["A_shoulder", "twist"]
+    for name, joint in wanted.joints.items():
+        assert found.joints[name].axis == joint.axis and found.joints[name].origin_m == joint.origin_m
+        assert found.links[found.joints[name].child].mass_kg == wanted.links[joint.child].mass_kg
 
 
 def test_without_mujoco_its_extra_is_named(path: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,17 +1,20 @@
 """The generated model: masses, limits, shapes; and what is too large to be simulated."""
 
+from xml.etree import ElementTree as Xml
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from nlp_gait import load
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Result, Signals
 from nlp_gait.formulation.registry import LARGEST_COUNT
 from nlp_gait.gaits.nao.body import GRAVITY
-from nlp_gait.robots import load_robot
-from nlp_gait.robots.tree import weld
+from nlp_gait.robots import Link, load_robot
+from nlp_gait.robots.tree import TreeBody, list_moments, weld
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import make_plan_model
+from nlp_gait.simulation.mjcf import add_bodies, make_plan_model
 from nlp_gait.simulation.plan import LONGEST_S as LONGEST_PLAYED_S
 from nlp_gait.simulation.plan import MOST_STEPS, Plan, make_plan
 from nlp_gait.simulation.shapes import Prism, make_shapes
@@ -67,3 +70,18 @@ def test_the_length_of_a_simulated_walk_is_limited() -> None:
     ):
         with pytest.raises(InputError, match=words):
             make_plan(result, steps)
+
+
+def test_the_engine_accepts_rods_and_plates_in_any_axes() -> None:
+    """Decomposed again, their largest moment may be above the sum of the others by rounding."""
+    engine = pytest.importorskip("mujoco")
+    for moments in ((3.2e-9, 1.47796e-3, 1.47796e-3 + 3.2e-9), (0.0, 2e-3, 2e-3), (1e-3, 2e-3, 3e-3)):
+        for turn in Rotation.random(20, rng=0).as_matrix():
+            tensor = list_moments(turn @ np.diag(moments) @ turn.T)
+            link = Link(name="link", mass_kg=0.36, com_m=(0.0, 0.0, 0.0), inertia_com_kgm2=tensor)
+            zero = (0.0, 0.0, 0.0)
+            body = TreeBody(link=link, parent=-1, joint=None, direction=1, offset_m=zero, com_offset_m=zero)
+            root = Xml.Element("mujoco")
+            add_bodies(Xml.SubElement(root, "worldbody"), [body], {}, root="free")
+            found = engine.MjModel.from_xml_string(Xml.tostring(root, encoding="unicode")).body("link").inertia
+            np.testing.assert_allclose(np.sort(found), moments, atol=1e-6)
