@@ -199,18 +199,14 @@ def check_sizes(robot: str, links: Links, joints: Joints, notes: list[str]) -> N
     size = float(np.linalg.norm(np.ptp(places, axis=0)))
     mass_kg = sum(link.mass_kg for link in links.values())
     heaviest = max(links.values(), key=lambda link: link.mass_kg)
-    if mass_kg > WATER * size**3:
+    if 0.0 < WATER * size**3 < mass_kg:
         raise RobotDataError(
             f"robot {robot!r}: {heaviest.name!r} has {heaviest.mass_kg:.3g} kg, root and joints span {size:.3g} m; masses are in "
             "kg: is it in g, or of another scale?"
         )
     for name, link in links.items():
-        radius = (
-            math.sqrt(max(float(np.trace(link.inertia_matrix)), 0.0) / (2 * link.mass_kg))
-            if link.mass_kg > 0.0
-            else 0.0
-        )
-        if radius <= size:
+        trace = max(float(np.trace(link.inertia_matrix)), 0.0)
+        if link.mass_kg <= 0.0 or (radius := math.sqrt(trace / (2 * link.mass_kg))) <= size:
             continue
         fault = (
             f"the tensor of {name!r} spreads {link.mass_kg:.3g} kg by {radius:.3g} m, root and joints by {size:.3g} m"
