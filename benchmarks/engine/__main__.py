@@ -2,8 +2,7 @@
 
     python -m benchmarks.engine [TABLE ...]
 
-About half an hour for all but ``tuned`` and ``tuned-thrice`` on one core; these run if they are named, take hours and continue
-where they stopped. Each table has a title. Nothing is tuned per gait or speed.
+About half an hour for all but ``tuned`` on one core; that one runs if it is named, and continues where it stopped. Each table has a title. Nothing is tuned per gait or speed.
 """
 
 from __future__ import annotations
@@ -22,19 +21,16 @@ TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "disturbed": feedback.disturbed,
     "stairs": other_robots.stairs,
     "tuned-briefly": tuning.tuned_briefly,
-    "tuned-thrice": tuning.tuned_thrice,
     "tuned": tuning.tuned,
 }
-LONG = ("tuned-thrice", "tuned")
+LONG = "tuned"
 
 
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.engine", description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "tables", nargs="*", metavar="TABLE", help=f"{', '.join(TABLES)} (default: all but {' and '.join(LONG)})"
-    )
-    named = parser.parse_args().tables or [name for name in TABLES if name not in LONG]
+    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"{', '.join(TABLES)} (default: all but {LONG})")
+    named = parser.parse_args().tables or [name for name in TABLES if name != LONG]
     unknown = [name for name in named if name not in TABLES]
     if unknown:
         parser.error(f"unknown table {unknown[0]!r}; known: {', '.join(TABLES)}")
