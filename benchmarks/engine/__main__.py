@@ -2,7 +2,8 @@
 
     python -m benchmarks.engine [TABLE ...]
 
-About half an hour for all but ``tuned`` on one core; that one runs if it is named, and continues where it stopped. Each table has a title. Nothing is tuned per gait or speed.
+About half an hour for all but ``tuned`` on one core; that one runs if it is named, takes six hours and continues where it
+stopped. Each table has a title. Nothing is tuned per gait or speed.
 """
 
 from __future__ import annotations
