@@ -313,7 +313,7 @@ def describe_energy(walked: Row) -> str:
 def shorten(message: str) -> str:
     """Return the sentence of an error that names the fault, without the robot's name and the remedy."""
     fault = re.sub(r"^robot (file )?'[^']*': ", "", message)
-    if pair := re.search(r"the lowest pair, .*?(?=; if other)|no links are mirror images", fault):
+    if pair := re.search(r"the lowest pair, .*?(?=; if these)|no links are mirror images", fault):
         return pair[0]
     return re.split(r"\. [A-Z]|; (?:correct|else|put it there|add its motor|a rigid body)|: none of its", fault)[0]
 
