@@ -39,11 +39,14 @@ class Hessian:
         for samples, bar in zip(reversed(stages), reversed(bars), strict=True):
             if len(samples.active) and len(samples.used):
                 self._add_samples(samples, bar, contributions)
-        keys = unite(d * assembler.n + c for d, c, *_ in contributions)
+        entries = np.concatenate([np.zeros(0, int), *(d * assembler.n + c for d, c, *_ in contributions)])
+        keys, numbers = np.unique(entries, return_inverse=True)
         self.place = plan.allocate(len(keys))
         plan.reset(SECOND, self.place, len(keys), marker)
-        for d, c, row, first, second in contributions:
-            plan.add_product(SECOND, row, self.place + np.searchsorted(keys, d * assembler.n + c), first, second)
+        end = 0
+        for _, c, row, first, second in contributions:
+            begin, end = end, end + len(c)
+            plan.add_product(SECOND, row, self.place + numbers[begin:end], first, second)
         n = assembler.n
         self.sparsity = ca.Sparsity.triplet(n, n, (keys % n).tolist(), (keys // n).tolist())
 
@@ -114,8 +117,8 @@ class Hessian:
 
 def _add_outer(row: Row, second_row: Row, factor: int, contributions: Products) -> None:
     """Add the products of each entry d of a row with the entries c <= d of another one, times a factor."""
-    for column, place in zip(row.columns.tolist(), row.places.tolist(), strict=True):
-        end = int(np.searchsorted(second_row.columns, column, side="right"))
+    ends = np.searchsorted(second_row.columns, row.columns, side="right")
+    for column, place, end in zip(row.columns.tolist(), row.places.tolist(), ends.tolist(), strict=True):
         if end:
             low = Row(second_row.columns[:end], second_row.places[:end])
             contributions.append((np.full(end, column), low.columns, low, place, factor))

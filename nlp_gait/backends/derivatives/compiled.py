@@ -26,8 +26,8 @@ UNARY = ("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sin
 BINARY = ("pow", "fmod", "copysign", "fmin", "fmax", "atan2", "hypot")
 
 
-def write_nlp_source(nlp_plan: NlpPlan) -> str:
-    """Return C++ of an NLP's functions (see ``native/nlp.hpp``); the lane count is the macro LANES."""
+def write_nlp_sources(nlp_plan: NlpPlan) -> tuple[str, str]:
+    """Return C++ of an NLP (see ``native/nlp.hpp``), and of its functions of one sample; the lane count is the macro LANES."""
     plan = nlp_plan.plan
     m, n = nlp_plan.jacobian.shape
     phases = dict(zip(("value", "first", "second"), plan.steps, strict=True))
@@ -53,14 +53,18 @@ def write_nlp_source(nlp_plan: NlpPlan) -> str:
         f"case {CODES[operation]}: r = {expression.format('a', 'b', f='s_')}; break;"
         for operation, expression in EXPRESSIONS.items()
     )
-    sources = [
-        "#include <stdlib.h>\n#include <string.h>",
+    operations = [
         read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
         read_native_source("nlp_gait.backends.derivatives", "operations.hpp"),
         *(f"ONE_ARGUMENT({name})" for name in UNARY),
         *(f"TWO_ARGUMENTS({name})" for name in BINARY),
+    ]
+    functions = [write_function(f"function_{i}", function) for i, function in enumerate(plan.functions)]
+    sources = [
+        "#include <stdlib.h>\n#include <string.h>",
+        *operations,
         *(f"enum {{ {name} = {size} }};" for name, size in sizes.items()),
-        *(write_function(f"function_{i}", function) for i, function in enumerate(plan.functions)),
+        *(f"void function_{i}(const Vector*, Vector*);" for i in range(len(functions))),
         write_array("int", "initial_place", plan.initial),
         write_array("double", "initial_value", map(format_number, plan.initial.values())),
         write_array("int", "jacobian_place", nlp_plan.jacobian_places.tolist()),
@@ -73,8 +77,9 @@ def write_nlp_source(nlp_plan: NlpPlan) -> str:
         _write_calls(nlp_plan),
         f"#define OPERATIONS {cases}",
         read_native_source("nlp_gait.backends.derivatives", "nlp.hpp"),
+        read_native_source("nlp_gait.backends.derivatives", "casadi.hpp"),
     ]
-    return "\n".join(sources)
+    return "\n".join(sources), "\n".join([*operations, *functions])
 
 
 def _write_rows(name: str, width: int, rows: Iterable[Sequence[int]]) -> str:
@@ -141,14 +146,13 @@ class CompiledNlp:
         lanes = native_lanes()
         names = [*NLP_VALUES, *list(DERIVATIVES.values())[: 3 if second else 2]]
         graph = ca.Function("nlp", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]]).serialize()
-        interface = "\n" + read_native_source("nlp_gait.backends.derivatives", "casadi.hpp")
         # The library is found without generating its source, by what the source depends on.
         loaded, _ = load_library(
             "\0".join([graph, version("casadi"), _hash_generator(), str(second)]),
             find_compiler(),
             (*FLAGS, *lane_flags(lanes), f"-DLANES={lanes}"),
             names,
-            lambda: write_nlp_source(make_nlp_plan(split_nlp(nlp), second=second)) + interface,
+            lambda: write_nlp_sources(make_nlp_plan(split_nlp(nlp), second=second)),
         )
         library = loaded._name  # noqa: SLF001 (documented; what was checked, whatever the path names now)
         self.functions = {name: ca.external(name, library) for name in names}

@@ -8,6 +8,7 @@ or calls a function of one sample for all pairs of a sample and a direction, as 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -35,6 +36,7 @@ _TEXTS = {
 _TEXTS |= {name: f"{{f}}{name.lower()}({{0}})" for name in _UNARY.split()}
 _TEXTS |= {name: f"{{f}}{_NAMES.get(name, name.lower())}({{0}}, {{1}})" for name in _BINARY.split()}
 EXPRESSIONS: dict[int, str] = {getattr(ca, f"OP_{name}"): text for name, text in _TEXTS.items()}
+OPERATIONS = {*EXPRESSIONS, ca.OP_INPUT, ca.OP_CONST, ca.OP_OUTPUT}
 CODES = {operation: code for code, operation in enumerate(EXPRESSIONS)}
 # Operations in one C++ function: longer ones take the compiler longer per operation, shorter ones pass more values in memory.
 PIECE = 500
@@ -43,7 +45,7 @@ PIECE = 500
 def read_operations(function: ca.Function) -> Iterator[Instruction]:
     """Yield the instructions of a function of scalar operations; raises CompilerError for one that has no C++ here."""
     for instruction in read_tape(function):
-        if instruction.operation not in (*EXPRESSIONS, ca.OP_INPUT, ca.OP_CONST, ca.OP_OUTPUT):
+        if instruction.operation not in OPERATIONS:
             raise CompilerError(f"operation {instruction.operation} of function {function.name()}")
         yield instruction
 
@@ -90,7 +92,7 @@ def write_function(name: str, function: ca.Function) -> str:
                 lines.append(f"kept[{kept[k]}] = t{k};")
         lines.append("}")
     calls = " ".join(f"{name}_{number}(in, out, kept);" for number in range(pieces))
-    lines.append(f"static void {name}(const Vector* in, Vector* out) {{ Vector kept[{len(kept) + 1}]; {calls} }}")
+    lines.append(f"void {name}(const Vector* in, Vector* out) {{ Vector kept[{len(kept) + 1}]; {calls} }}")
     return "\n".join(lines)
 
 
@@ -252,13 +254,6 @@ class DerivativePlan:
 
 def find_runs(targets: Integers, sources: Integers) -> list[tuple[int, int, int]]:
     """Split two lists of places into runs in which both increase by one; return target, source, length of each."""
-    runs: list[tuple[int, int, int]] = []
-    end = None
-    for place in zip(targets.tolist(), sources.tolist(), strict=True):
-        if place == end:
-            target, source, length = runs.pop()
-            runs.append((target, source, length + 1))
-        else:
-            runs.append((*place, 1))
-        end = place[0] + 1, place[1] + 1
-    return runs
+    places = list(zip(targets.tolist(), sources.tolist(), strict=True))
+    ends = [k for k, (t, s) in enumerate(places[1:], 1) if places[k - 1] != (t - 1, s - 1)]
+    return [(*places[begin], end - begin) for begin, end in pairwise([0, *ends, len(places)]) if places]

@@ -208,11 +208,12 @@ def load_library(
     compiler: Compiler,
     flags: Sequence[str],
     symbols: Sequence[str],
-    write_source: Callable[[], str] | None = None,
+    write_sources: Callable[[], Sequence[str]] | None = None,
 ) -> tuple[ctypes.CDLL, Path]:
     """Return the library of a C++ source, which must have some functions, and its file, cached or built; raises CompilerError.
 
-    With ``write_source``, which is called to build it, ``source`` is everything that it depends on.
+    With ``write_sources``, which is called to build it, ``source`` is everything that it depends on. All of them but the first are
+    compiled once for all libraries of this process.
     """
     machine = (platform.system(), platform.machine(), *platform.libc_ver())
     inputs = (source, *compiler.command, compiler.version, *flags, *machine)
@@ -226,7 +227,7 @@ def load_library(
                 with lock_folder(folder, f"{key}.lock"):  # another process may be building it
                     library = _find_library(folder, key, symbols)
                     if library is None:
-                        _build_library(folder, key, write_source or (lambda: source), compiler, flags)
+                        _build_library(folder, key, write_sources or (lambda: [source]), compiler, flags)
                 library = library or _find_library(folder, key, symbols)
         except OSError as error:  # a full disk, a folder that may only be read
             reason = error.strerror or str(error)
@@ -239,16 +240,27 @@ def load_library(
 
 
 def _build_library(
-    folder: Path, key: str, write_source: Callable[[], str], compiler: Compiler, flags: Sequence[str]
+    folder: Path, key: str, write_sources: Callable[[], Sequence[str]], compiler: Compiler, flags: Sequence[str]
 ) -> None:
     """Build a library and move it to its name in a folder; raises CompilerError, and OSError if there is no room."""
     with make_temporary_folder("nlp-gait-build-", CompilerError) as workshop:
         file, built = workshop / "source.cpp", workshop / f"library{SUFFIX}"
-        file.write_text(write_source(), encoding="utf-8")
-        compiler.build(file, built, flags)
+        source, *others = write_sources()
+        file.write_text(source, encoding="utf-8")
+        objects = [_compile_object(other, compiler, tuple(flags)) for other in others]
+        compiler.build(file, built, (*flags, *objects))
         with tempfile.TemporaryDirectory(dir=folder, prefix="new-") as landing:
             copy = shutil.copyfile(built, Path(landing) / built.name)
             os.replace(copy, folder / f"{key}-{_hash(built)}{SUFFIX}")
+
+
+@functools.lru_cache(maxsize=4)
+def _compile_object(source: str, compiler: Compiler, flags: tuple[str, ...]) -> str:
+    """Return the object file of a source, which exists until this process ends."""
+    file = make_private_folder() / f"{hashlib.sha256(source.encode()).hexdigest()}.cpp"
+    file.write_text(source, encoding="utf-8")
+    compiler.build(file, file.with_suffix(".o"), (*flags, "-c"))
+    return str(file.with_suffix(".o"))
 
 
 def _find_library(folder: Path, key: str, symbols: Sequence[str]) -> tuple[ctypes.CDLL, Path] | None:

@@ -36,13 +36,14 @@ class WorkingSet:
         options: Mapping[str, Any],
         watch: IterationWatch,
         always: Rows,
+        near: float | None = None,
     ) -> None:
         """Take the NLP, its functions by the names of ``nlpsol``, and IPOPT's options without derivatives and the watch.
 
-        ``watch`` ends runs; these begin with ``always`` (m,).
+        ``watch`` ends runs; these begin with ``always`` (m,), and with the rows that are as ``near`` to a bound at their start.
         """
         self._nlp, self._functions, self._options = nlp, functions, options
-        self._watch, self._begin = watch, always
+        self._watch, self._begin, self._near = watch, always, near
         self._get_solver = lru_cache(CACHED_SOLVERS)(self._make_solver)
         self._stats: dict[str, Any] = {}
 
@@ -64,6 +65,8 @@ class WorkingSet:
     def _solve_on_few_rows(self, arguments: Mapping[str, Any]) -> tuple[Mapping[str, Any], Rows]:
         """Return a result, which violates no row where the statistics report success, and the rows that it used."""
         rows, start = self._begin, arguments["x0"]
+        if self._near is not None:
+            rows = rows | self._find_violated(start, arguments, -self._near)
         self._stats = {}
         for _ in range(ROUNDS):
             chosen = np.flatnonzero(rows)
@@ -82,10 +85,10 @@ class WorkingSet:
         self._stats |= {"success": False, "return_status": UNSETTLED}
         return result, rows
 
-    def _find_violated(self, x: Any, arguments: Mapping[str, Any]) -> Rows:
+    def _find_violated(self, x: Any, arguments: Mapping[str, Any], most: float = VIOLATED) -> Rows:
         g = np.asarray(self._functions["nlp_g"](x, arguments["p"])).ravel()
         violations: Array = np.maximum(arguments["lbg"] - g, g - arguments["ubg"])
-        return ~(violations <= VIOLATED)  # NaN counts as violated
+        return ~(violations <= most)  # NaN counts as violated
 
     def _count(self, stats: Mapping[str, Any]) -> None:
         """Add the calls and iterations of a run to those of earlier runs; the status is that of the last run."""
