@@ -212,8 +212,8 @@ def load_library(
 ) -> tuple[ctypes.CDLL, Path]:
     """Return the library of a C++ source, which must have some functions, and its file, cached or built; raises CompilerError.
 
-    With ``write_sources``, which is called to build it, ``source`` is everything that it depends on. All of them but the first are
-    compiled once for all libraries of this process.
+    With ``write_sources``, which is called to build it, ``source`` is everything that it depends on. All of these but the first
+    are compiled once for all libraries of this process.
     """
     machine = (platform.system(), platform.machine(), *platform.libc_ver())
     inputs = (source, *compiler.command, compiler.version, *flags, *machine)
