@@ -34,14 +34,12 @@ AT_BOUND = 1e-4  # share of a variable's range
 # Default least margins of the ZMP in a plan, along and across, as shares of a sole's length and width; chosen by energy against
 # the push survived, see ``benchmarks/humanoids.py``.
 MARGINS = (0.06, 0.08)
-# Intervals of each phase: of the first grid, of the grid on which energies are evaluated, and the most that are planned. The
-# planned energy on a grid must be as near to the fine one as this, otherwise the next grid is finer by a factor.
-FIRST_GRID, FINE_GRID, LAST_GRID = 10, 120, 40
+# Intervals of each phase: of a cycle from which a walk starts, of the first grid, of that on which energies are evaluated, and
+# the most. The planned energy must be as near to the fine one as this, otherwise the next grid is finer by a factor.
+CYCLE_GRID, FIRST_GRID, FINE_GRID, LAST_GRID = 5, 10, 120, 40
 ENERGY_ERROR, FINER = 0.01, 1.5
-# A cycle is only where a walk starts: on a grid twice as coarse it takes half as long.
-CYCLE_GRID = 5
-# Most rows stay far from their bounds: with those that are near where a walk starts, an iteration takes a third of the time.
-SOLVER = IpoptSettings(few_rows=True, near=0.3)
+# On the rows that are near their bounds at the start an iteration takes a third of the time.
+SOLVER = IpoptSettings(few_rows=True, within=0.3)
 MANY_SOLVES = 10  # compiled functions pay, because they suit walks of any length and speed
 LEAST_MARGINS = ("dbm_x_min_limit_m", "dbm_y_min_limit_m")  # ends of the names of parameters
 MARGIN_WORDS = {

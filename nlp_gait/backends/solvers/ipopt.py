@@ -98,9 +98,8 @@ class IpoptSettings(Solver):
     #: whether a run begins with the rows that matter instead of all, see docs/computing.md; None: where the functions are
     #: compiled, because selecting the rows takes a run
     few_rows: bool | None = None
-    #: on few rows: begins with those that are as near to a bound at the start point, in units of their scales; None: with those
-    #: that a run to select them needs
-    near: float | None = None
+    #: few rows are those within this of a bound at the start point, in units of their scales; None: those that one run needs
+    within: float | None = None
     #: of the sigmoids that replace a jump, one stage for each, in units of the switch [m for a margin]; empty for those of the
     #: NLP. Narrower ones follow if the exact functions refuse the last stage's point, or if smoothing is expensive there
     widths: tuple[float, ...] = ()
@@ -196,7 +195,7 @@ class Ipopt(Solver):
             self.near = WatchedSolver(ca.nlpsol("near", "ipopt", nlp, {**options, **derivatives, **near}), self.watch)
         self.cold: WatchedSolver | WorkingSet = WatchedSolver(all_rows, self.watch, LONGEST_INFEASIBLE)
         if settings.few_rows and nlp["g"].shape[0] >= LEAST_ROWS:
-            self.cold = self._make_working_set(problem, {**general, **brief}, settings.near)
+            self.cold = self._make_working_set(problem, {**general, **brief}, settings.within)
         self._patient = nlp, {**options, **derivatives}
         self.create_s = time.perf_counter() - started
 
@@ -205,10 +204,10 @@ class Ipopt(Solver):
         """The first stage on all rows that restores feasibility for as long as it takes."""
         return WatchedSolver(ca.nlpsol("patient", "ipopt", *self._patient), self.watch)
 
-    def _make_working_set(self, problem: GaitProblem, options: Mapping[str, Any], near: float | None) -> WorkingSet:
+    def _make_working_set(self, problem: GaitProblem, options: Mapping[str, Any], within: float | None) -> WorkingSet:
         """Make a first stage that begins with few rows: ties of lifted variables, equations, and rows near the start.
 
-        Without ``near``, one run finds the rows that it needs. That run uses the parameters' defaults, so that it does not depend
+        Without ``within``, one run finds the rows that it needs. It uses the parameters' defaults, so that the rows do not depend
         on which copy of the problem is solved first.
         """
         model = self.model
@@ -216,8 +215,8 @@ class Ipopt(Solver):
         bounds, width = model.bounds(usual), self.widths[0]
         always = bounds["lbg"] == bounds["ubg"]
         always[len(model.row_names) :] = True
-        cold = WorkingSet(model.nlp, self.functions, options, self.watch, always, near)
-        if near is not None:
+        cold = WorkingSet(model.nlp, self.functions, options, self.watch, always, within)
+        if within is not None:
             return cold
         start = model.start(usual, usual.start_point(np.random.default_rng(0)), width)
         with defer_interrupts() as pressed:

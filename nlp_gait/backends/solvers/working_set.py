@@ -36,14 +36,14 @@ class WorkingSet:
         options: Mapping[str, Any],
         watch: IterationWatch,
         always: Rows,
-        near: float | None = None,
+        within: float | None = None,
     ) -> None:
         """Take the NLP, its functions by the names of ``nlpsol``, and IPOPT's options without derivatives and the watch.
 
-        ``watch`` ends runs; these begin with ``always`` (m,), and with the rows that are as ``near`` to a bound at their start.
+        ``watch`` ends runs; these begin with ``always`` (m,), and the rows ``within`` a distance of a bound at their start.
         """
         self._nlp, self._functions, self._options = nlp, functions, options
-        self._watch, self._begin, self._near = watch, always, near
+        self._watch, self._begin, self._within = watch, always, within
         self._get_solver = lru_cache(CACHED_SOLVERS)(self._make_solver)
         self._stats: dict[str, Any] = {}
 
@@ -65,8 +65,8 @@ class WorkingSet:
     def _solve_on_few_rows(self, arguments: Mapping[str, Any]) -> tuple[Mapping[str, Any], Rows]:
         """Return a result, which violates no row where the statistics report success, and the rows that it used."""
         rows, start = self._begin, arguments["x0"]
-        if self._near is not None:
-            rows = rows | self._find_violated(start, arguments, -self._near)
+        if self._within is not None:
+            rows = rows | self._find_violated(start, arguments, -self._within)
         self._stats = {}
         for _ in range(ROUNDS):
             chosen = np.flatnonzero(rows)

@@ -20,7 +20,7 @@ NAMES = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l")
 
 
 def polygon(
-    *, linear: bool = False, always: Any = None, near: float | None = None
+    *, linear: bool = False, always: Any = None, within: float | None = None
 ) -> tuple[WorkingSet, ca.Function, IterationWatch, dict[str, Any]]:
     """The point of a polygon of many sides about the unit circle that is nearest to (2, 1), or farthest in a direction."""
     x, p = MX.sym("x", 2), MX.sym("p")
@@ -31,7 +31,7 @@ def polygon(
     watch = IterationWatch(nlp)
     whole = ca.nlpsol("whole", "ipopt", nlp, {**QUIET, "iteration_callback": watch})
     functions = {name: whole.get_function(name) for name in NAMES}
-    few = WorkingSet(nlp, functions, QUIET, watch, np.zeros(SIDES, dtype=bool) if always is None else always, near)
+    few = WorkingSet(nlp, functions, QUIET, watch, np.zeros(SIDES, dtype=bool) if always is None else always, within)
     inf = np.full(2, np.inf)
     sides = {"lbg": np.where(sign > 0, -np.inf, -1.0), "ubg": np.where(sign > 0, 1.0, np.inf)}
     arguments = {"p": [1.0], "lbx": -inf, "ubx": inf, **sides}
@@ -54,7 +54,7 @@ def test_rows_that_are_violated_join_until_none_is() -> None:
     few.add_violated_rows(**arguments)
     assert same(few(**arguments), whole(**arguments)) and few.stats()["iter_count"] < first  # all in one round
     assert few.stats()["n_call_nlp_hess_l"] <= first
-    few, *_, arguments = polygon(near=1.05)  # the start is 1.0 from the side at the end, of 0.8 to 1.2
+    few, *_, arguments = polygon(within=1.05)  # the start is 1.0 from the side at the end, of 0.8 to 1.2
     assert same(found := few(**arguments), whole(**arguments))
     heights = 1.0 - np.array([0.1, -0.2]) @ [f(np.arange(SIDES) * 2.0 * math.pi / SIDES) for f in (np.cos, np.sin)]
     assert (np.array(found["lam_g"]) != 0.0).tolist() == (heights <= 1.05).tolist()  # all in one round
