@@ -34,9 +34,9 @@ AT_BOUND = 1e-4  # share of a variable's range
 # Default least margins of the ZMP in a plan, along and across, as shares of a sole's length and width; chosen by energy against
 # the push survived, see ``benchmarks/humanoids.py``.
 MARGINS = (0.06, 0.08)
-# Intervals of each phase: of a cycle from which a walk starts, of the first grid, of that on which energies are evaluated, and
-# the most. The planned energy must be as near to the fine one as this, otherwise the next grid is finer by a factor.
-CYCLE_GRID, FIRST_GRID, FINE_GRID, LAST_GRID = 5, 10, 120, 40
+# Intervals of each phase: of the first grid, of the grid on which energies are evaluated, and the most that are planned. The
+# planned energy on a grid must be as near to the fine one as this, otherwise the next grid is finer by a factor.
+FIRST_GRID, FINE_GRID, LAST_GRID = 10, 120, 40
 ENERGY_ERROR, FINER = 0.01, 1.5
 # On the rows that are near their bounds at the start an iteration takes a third of the time.
 SOLVER = IpoptSettings(few_rows=True, within=0.3)
@@ -312,7 +312,7 @@ def _load_cycle(problem: GaitProblem, step_m: float | None) -> GaitProblem:
     options = problem.options
     name = problem.name.replace("walk", "cycle")
     sides = {"alike": True} if "alike" in options else {}  # it is only where a solver starts
-    cycle = load(name, robot=options["robot"], intervals=min(CYCLE_GRID, options["intervals"]), **sides)
+    cycle = load(name, robot=options["robot"], intervals=options["intervals"], **sides)
     if step_m is None and problem.value(f"{STEP}.lower") == problem.value(f"{STEP}.upper"):
         step_m = problem.value(f"{STEP}.lower")
     if step_m is None:
@@ -374,7 +374,8 @@ def _run_starts(problem: GaitProblem, cycle: GaitProblem | None, settings: WalkS
                 problem = choose_finer_grid(problem, x0, settings) or problem
         for barrier in BARRIERS:
             if barrier not in solvers:  # the second one is rarely needed
-                solvers[barrier] = replace(SOLVER, barrier=barrier).prepare(problem, solves=MANY_SOLVES)
+                ipopt = replace(SOLVER, few_rows=barrier == BARRIERS[0], barrier=barrier)
+                solvers[barrier] = ipopt.prepare(problem, solves=MANY_SOLVES)
             solution = solve(problem, x0=x0, solver=solvers[barrier], workers=1)
             settings.progress(f"start {k + 1}, {barrier} barrier: {solution.status}")
             yield solution
