@@ -207,8 +207,7 @@ class Ipopt(Solver):
     def _make_working_set(self, problem: GaitProblem, options: Mapping[str, Any], within: float | None) -> WorkingSet:
         """Make a first stage that begins with few rows: ties of lifted variables, equations, and rows near the start.
 
-        Without ``within``, one run finds the rows that it needs. It uses the parameters' defaults, so that the rows do not depend
-        on which copy of the problem is solved first.
+        Without ``within``, one run at the parameters' defaults finds them, whichever copy of the problem is solved first.
         """
         model = self.model
         usual = problem.with_values(**{parameter.name: parameter.default for parameter in problem.parameters})
