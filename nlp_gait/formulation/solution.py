@@ -338,7 +338,7 @@ def sample_finely(result: Result) -> Signals:
 def sample_at_period(result: Result, period_ms: int) -> Signals:
     """Return signals exactly a period apart, of all whole periods; of a motion that ends at rest, of the begun one, too.
 
-    Values are interpolated linearly between fine samples, so that torques do not overshoot where a foot lands. Raises as
+    Between fine samples all but angles are linear, so that torques do not overshoot where a foot lands. Raises as
     ``sample_signals``, and InputError for a period that is not a whole number of milliseconds >= 1.
     """
     check_count("period_ms", period_ms)
@@ -353,5 +353,16 @@ def sample_at_period(result: Result, period_ms: int) -> Signals:
         if name != "t":
             columns = values.reshape(len(values), -1).T
             interpolated = np.stack([np.interp(t, fine.arrays["t"], column) for column in columns], axis=1)
+            if name == "q" and "qd" in fine.arrays:
+                interpolated = _interpolate_angles(fine, t)
             arrays[name] = np.round(interpolated) if np.isin(values, (0.0, 1.0)).all() else interpolated
     return replace(fine, arrays=arrays)
+
+
+def _interpolate_angles(fine: Signals, t: Array) -> Array:
+    """Return angles (T, J) at times (T,) by cubics between fine samples and their rates, so that differences are smooth."""
+    from scipy.interpolate import CubicHermiteSpline  # takes longer to import than everything else
+
+    times, first = np.unique(fine.arrays["t"], return_index=True)
+    angles = CubicHermiteSpline(times, fine.arrays["q"][first], fine.arrays["qd"][first])
+    return np.asarray(angles(np.minimum(t, times[-1])))

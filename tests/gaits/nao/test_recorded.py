@@ -50,7 +50,7 @@ def judged(gait: RecordedGait) -> Evaluation:
     return evaluate(gait.problem, np.array(gait.x), prove=False)
 
 
-@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp", "nao-cycle"])
+@pytest.mark.parametrize("name", [pytest.param("nao-ssp", marks=pytest.mark.commit), "nao-dsp", "nao-cycle"])
 def test_a_planned_gait_that_is_read_back_gets_the_same_verdict(name: str, tmp_path: Path) -> None:
     gait = make_recorded_gait(read_joint_angles(written(tmp_path, name, 1 if name == "nao-cycle" else 10), ROBOT))
     assert gait.gait == name and not gait.motion.mirrored and gait.lean_deg < 1e-4
