@@ -32,7 +32,7 @@ CLEAR_LEAD_M = 0.03  # soles whose parts in front of and behind the ankle differ
 CLEAR_LEAD = 1 / 3  # of their length, by which they contradict the knees
 NEGLIGIBLE_INERTIA = 0.01  # of a link, as a share of that of the robot's mass at its size
 NEGLIGIBLE_MASS = 0.005  # of a link, as a share of the robot's
-DENSEST, WATER = 22590.0, 1000.0  # of solids, osmium; above that of any robot in a cube of its size [kg/m^3]
+DENSEST = 22590.0  # of solids, osmium [kg/m^3]
 PAIRED_M, PAIRED_COSINE = 1e-2, 0.99  # axes of a pair of joints are images of each other to this
 LEAST_JOINTS = 3  # of limbs that may be legs
 LEAST_WIDTH_M = 0.01  # a narrower sole is a line or a point
@@ -199,7 +199,7 @@ def check_sizes(robot: str, links: Links, joints: Joints, notes: list[str]) -> N
     size = float(np.linalg.norm(np.ptp(places, axis=0)))
     mass_kg = sum(link.mass_kg for link in links.values())
     heaviest = max(links.values(), key=lambda link: link.mass_kg)
-    if 0.0 < WATER * size**3 < mass_kg:
+    if 0.0 < DENSEST * size**3 < mass_kg:
         raise RobotDataError(
             f"robot {robot!r}: {heaviest.name!r} has {heaviest.mass_kg:.3g} kg, root and joints span {size:.3g} m; masses are in "
             "kg: is it in g, or of another scale?"

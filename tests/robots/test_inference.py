@@ -195,8 +195,8 @@ INCOMPLETE = [
         r"no feet found: .* points along y at zero angles, and z must be up: turn the root",
     ),
     (
-        change('<mass value="1.1"/>', '<mass value="1100"/>'),
-        r"'A_knee_link' has 1\.1e\+03 kg, root and joints span .* is it in g",
+        change('<mass value="1.1"/>', '<mass value="1.1e5"/>'),
+        r"'A_knee_link' has 1\.1e\+05 kg, root and joints span .* is it in g",
     ),
     (
         change('<mass value="1.1"/>', '<mass value="0"/>'),
