@@ -32,7 +32,7 @@ class JudgedGait:
     notes: tuple[str, ...]  #: joints that were left out, exchanged sides, reasons for missing results
 
     def rows(self) -> list[tuple[str, float, float]]:
-        """Return name and value of each metric, and its value at the optimum, NaN if there is none."""
+        """Return name and value of each metric, and its value at the optimum (NaN without an optimum)."""
         optimum = {} if self.optimum is None else self.optimum.metrics
         return [(name, value, optimum.get(name, math.nan)) for name, value in self.evaluation.metrics.items()]
 

@@ -350,11 +350,11 @@ def sample_at_period(result: Result, period_ms: int) -> Signals:
     t = np.arange(periods + 1) * period_ms / 1000.0
     arrays = {"t": t}
     for name, values in fine.arrays.items():
-        if name != "t":
+        if name == "q" and "qd" in fine.arrays:
+            arrays[name] = _interpolate_angles(fine, t)
+        elif name != "t":
             columns = values.reshape(len(values), -1).T
             interpolated = np.stack([np.interp(t, fine.arrays["t"], column) for column in columns], axis=1)
-            if name == "q" and "qd" in fine.arrays:
-                interpolated = _interpolate_angles(fine, t)
             arrays[name] = np.round(interpolated) if np.isin(values, (0.0, 1.0)).all() else interpolated
     return replace(fine, arrays=arrays)
 

@@ -145,7 +145,7 @@ def find_middle(legs: Legs) -> Array:
 
 
 def _find_direction_fault(legs: Legs) -> str:
-    """Return whereto the legs point if that is not down, in words; "" if it is."""
+    """Return the direction of the legs at zero angles in words; "" if it is down."""
     leg = legs.ankles_m[0] - legs.hip_m
     axis = int(np.argmax(np.abs(leg)))
     if axis == 2 and leg[2] < 0.0:
@@ -315,12 +315,14 @@ def _check_lowest(robot: str, foot: str, joints: Joints, read_shapes: ReadShapes
     """Raise RobotDataError if a link that turns against the foot reaches lower, as that behind a seventh joint of a leg does."""
     lowest = read_shapes(foot).points[:, 2].min(initial=math.inf)
     for joint in joints.values():
-        if joint.parent == foot and len(points := read_shapes(joint.child).points):
-            if joint.origin_m[2] + points[:, 2].min() < lowest - SOLE_THICKNESS_M:
-                raise RobotDataError(
-                    f"robot {robot!r}: {joint.child!r} reaches lower than {foot!r}, the sixth link of the leg, which carries it; "
-                    f"legs have {LEG_JOINT_COUNT} turning joints here: make fixed those that a gait does not need"
-                )
+        if joint.parent != foot:
+            continue
+        below = joint.origin_m[2] + read_shapes(joint.child).points[:, 2].min(initial=math.inf)
+        if below < lowest - SOLE_THICKNESS_M:
+            raise RobotDataError(
+                f"robot {robot!r}: {joint.child!r} reaches lower than {foot!r}, the sixth link of the leg, which carries it; "
+                f"legs have {LEG_JOINT_COUNT} turning joints here: make fixed those that a gait does not need"
+            )
 
 
 def _find_sole(robot: str, link: str, read_shapes: ReadShapes, ankle_m: Array, leg_m: float) -> InferredSole:

@@ -24,7 +24,8 @@ TIME_STEP = 0.0005  # [s]
 FRICTION = 0.7  # rubber-like soles on a hard floor
 TURNING_FRICTION, ROLLING_FRICTION = 0.005, 0.0001  # MuJoCo's defaults; with condim 3 neither acts
 LEAST_MOMENT = 1e-12  # of inertia that MuJoCo accepts [kg m^2]
-BALL_RADIUS, ROUNDING = 1e-3, 1e-9  # [m]; of the sum of two principal moments, as a share of the third
+BALL_RADIUS = 1e-3  # [m]
+ROUNDING = 1e-9  # by which the sum of two principal moments may miss the third, as a share of it
 LAST_TREAD, STAIR_HALF_WIDTH = 2.0, 0.25  # [m]
 
 LEFT, RIGHT, TRUNK = "0.00 0.45 0.70 1", "0.84 0.37 0.00 1", "0.80 0.81 0.84 1"  # blue and orange of Okabe and Ito
